@@ -49,7 +49,7 @@ impl QuadFault {
     /// Words for the fault that continue the sentence "the quad …".
     pub fn words(self) -> &'static str {
         match self {
-            QuadFault::Degenerate => "has no area or repeats a corner",
+            QuadFault::Degenerate => "has no area: corners coincide or nearly so, or edges cross",
             QuadFault::NotPlanar => "is not planar",
             QuadFault::NotConvex => "is not convex (concave or self-crossing)",
         }

@@ -104,6 +104,14 @@ impl Pool {
         self.wavelength * SHORTEST.powf(i as f32 / (STRAIGHT - 1) as f32)
     }
 
+    /// Returns the side of the cells in which a field of waves and foam is computed, metres, if they are too
+    /// coarse for its foam: wider than half the length over which the foam's current slows down.
+    pub fn too_coarse(&self) -> Option<f32> {
+        let foam_cell = field::Grid::of(self).halved().cell;
+        (self.waves == PoolWaves::Field && self.foam > 0.0 && foam_cell > 0.5 * self.foam_reach)
+            .then_some(foam_cell)
+    }
+
     /// Returns the height of the surface, metres.
     pub fn level(&self) -> f32 {
         self.corners[0].y

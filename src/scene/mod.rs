@@ -702,6 +702,16 @@ impl Scene {
         warnings.extend(self.values.iter().flat_map(volumes::unused));
         warnings.extend(self.values.iter().flat_map(bright_colours));
         warnings.extend(self.values.iter().flat_map(effect::told));
+        let coarse = |pool: &Pool| {
+            let cell = pool.too_coarse()?;
+            let name = &pool.name;
+            Some(format!(
+                "pool {name} is so large that its foam is computed in cells of {cell:.3} m, too coarse for \
+                 pools.{name}.foam_reach = {}: bring its corners nearer, or set pools.{name}.waves=sum",
+                pool.foam_reach
+            ))
+        };
+        warnings.extend(self.pools.iter().filter_map(coarse));
         if !self.rocks.is_empty() && self.rocks.iter().all(|rock| self.is_behind(rock)) {
             warnings.push(
                 "all rock is seen from behind, and has the wrong light: list its corners counter-clockwise \

@@ -148,7 +148,10 @@ fn sheet_quads(
     if quads.len() + count > MAX_QUADS {
         return Err(Error::input(
             format!("sheet {name} makes {count} quads, with the others {}", quads.len() + count),
-            format!("lower sheets.{name}.segments or columns: a scene has at most {MAX_QUADS} quads"),
+            format!(
+                "lower segments or columns of sheets, or use fewer of them: a scene has at most {MAX_QUADS} \
+                 quads"
+            ),
         ));
     }
     let made = sheet.quads().map_err(|SheetFault { segment, column, fault }| {
@@ -204,7 +207,10 @@ fn splash_quads(
     if quads.len() + count > MAX_QUADS {
         return Err(Error::input(
             format!("splash {name} makes {count} quads, with the others {}", quads.len() + count),
-            format!("lower {} or segments: a scene has at most {MAX_QUADS} quads", key("count")),
+            format!(
+                "lower {} or segments, or use fewer sheets: a scene has at most {MAX_QUADS} quads",
+                key("count")
+            ),
         ));
     }
     for arc in splash.arcs() {

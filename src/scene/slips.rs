@@ -31,7 +31,9 @@ pub fn cut(text: &str) -> String {
 /// Returns advice on a value that the parameter does not allow.
 pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
     match (param.kind, raw) {
-        (Kind::Int(..), Raw::Float(x)) if x.fract() == 0.0 && x.abs() < 1e15 => {
+        (Kind::Int(least, most, _), Raw::Float(x))
+            if x.fract() == 0.0 && (least as f64..=most as f64).contains(x) =>
+        {
             Some(format!("write a whole number: {x:.0}"))
         }
         (Kind::Int(..), Raw::Float(_)) => Some("write a whole number".into()),

@@ -1,5 +1,5 @@
-//! §4 Torn water: holes that open in a falling sheet, grow into gaps between threads, and leave drops. Twin:
-//! `shaders/trace/tear.wgsl`.
+//! §4 Torn water: holes that open in a falling sheet, grow into gaps between threads, and leave drops. Twins:
+//! `shaders/trace/tear.wgsl`, and `src/engine/cpu/integrate/lockstep/tear.rs` for eight rays.
 //!
 //! A sheet that falls is stretched, so it grows thin, and thin water is torn by every disturbance (Dombrowski
 //! and Johns 1963). The holes are places where noise is above a threshold. The noise lies in the volume, so
@@ -10,18 +10,19 @@ use glam::Vec2;
 
 use super::noise::lattice;
 use crate::mapping::Tear;
+use crate::util::powers::log2;
 
 /// Finer and finer octaves: their cells in one of the coarsest, across and along, and their weights.
-const OCTAVES: [(u32, u32, f32); 3] = [(1, 1, 1.0), (2, 2, 0.6), (4, 3, 0.36)];
+pub const OCTAVES: [(u32, u32, f32); 3] = [(1, 1, 1.0), (2, 2, 0.6), (4, 3, 0.36)];
 /// Octaves by which threads run ahead, which vary across the sheet alone: the same numbers, in rows.
-const LEADS: [(u32, f32); 2] = [(2, 1.5), (4, 0.75)];
+pub const LEADS: [(u32, f32); 2] = [(2, 1.5), (4, 0.75)];
 /// Reciprocal of the noise's standard deviation, which is √(0.5518/12) for one octave, times the root of the
 /// sum of the weights' squares.
-const INVERSE_DEVIATION: f32 = 3.8215;
+pub const INVERSE_DEVIATION: f32 = 3.8215;
 /// Share of the sheet between the border of a hole, where erosion begins, and where nothing is left.
-const SOFT: f32 = 0.6;
+pub const SOFT: f32 = 0.6;
 /// Levels of a pyramid from where the finest octave is lost to where all are.
-const LEVELS: f32 = 2.0;
+pub const LEVELS: f32 = 2.0;
 
 /// Value noise at `p` in cells of a lattice that repeats after `period` cells, 0 to 1.
 #[inline]
@@ -75,7 +76,7 @@ pub fn erosion(tear: &Tear, v: f32, place: Vec2, cells: f32, level: f32) -> f32 
     }
     let torn = ((rank(tear.lattice, place) - (1.0 - open)) * (1.0 / SOFT)).clamp(0.0, 1.0);
     // A pixel that sees whole holes sees their mean.
-    let hole = (cells / tear.lattice[0] as f32).log2();
+    let hole = log2(cells / tear.lattice[0] as f32);
     let unseen = (1.0 + (level - hole) * (1.0 / LEVELS)).clamp(0.0, 1.0);
     torn + (mean(open) - torn) * unseen
 }

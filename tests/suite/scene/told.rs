@@ -185,3 +185,21 @@ fn an_empty_volume_names_its_cause() {
     let empty = said("volumes.coat.alpha=0");
     assert!(empty.contains("the volume is empty: no cell has density; volumes.coat.alpha is 0"), "{empty}");
 }
+
+#[test]
+fn a_pool_too_large_for_the_cells_of_its_foam_is_told() {
+    let lake = |side: f32, waves: &str| {
+        format!(
+            "version = 2\n[pools.lake]\nwaves = \"{waves}\"\nfoam_reach = 2.4\ncorners = [[0, -9, {side}], \
+             [{side}, -9, {side}], [{side}, -9, 0], [0, -9, 0]]\n"
+        )
+    };
+    one(
+        &lake(1e4, "field"),
+        &[],
+        &["pool lake is so large", "cells of 39.", "foam_reach = 2.4", "waves=sum"],
+    );
+    for (side, waves) in [(40.0, "field"), (1e4, "sum")] {
+        assert!(!warnings(&lake(side, waves), &[]).concat().contains("lake"), "{side} {waves}");
+    }
+}

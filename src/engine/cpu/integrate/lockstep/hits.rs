@@ -7,11 +7,12 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::{Vec2, Vec3};
 
+use super::tear::{self, Places};
 use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
 use crate::trace::lookup::{STRANDS, StrandTurn};
-use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter, billow, tear};
+use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter, billow};
 use crate::util::lane_powers::log2;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, floor_cell};
 
@@ -219,19 +220,17 @@ impl Hits {
             seen = splat(0.5) * log2(simd, across.max(splat(1e-30)));
         }
 
-        let is_torn = hits.of_quads(simd, all, |quad| f32::from(u8::from(quad.is_torn())));
+        let open_near = hits.of_quads(simd, all, |quad| quad.tear.open[0]);
+        let open_far = hits.of_quads(simd, all, |quad| quad.tear.open[1]);
+        let open = open_near + (open_far - open_near) * v;
         let mut torn = zero;
-        if is_torn.simd_gt(zero).any_true() {
-            let mut places = Stored3::default();
-            places.store(Lanes3 { x: origin.x / nx, y: origin.y / ny, z: seen });
-            let (mut cells, at_v) = (Stored::default(), &at.0[1]);
-            cells.store(nx);
-            let of = |lane: usize| {
-                let place = places.get(lane);
-                let quad = &all[hits.quads[lane]];
-                tear::erosion(&quad.tear, at_v.0[lane], place.truncate(), cells.0[lane], place.z)
-            };
-            torn = Stored::from_fn(of).load(simd);
+        if open.simd_gt(zero).any_true() {
+            // Quads without holes have no lattice; theirs is not looked at.
+            let across = hits.of_quads(simd, all, |quad| quad.tear.lattice[0].max(1) as f32);
+            let along = hits.of_quads(simd, all, |quad| quad.tear.lattice[1].max(1) as f32);
+            let place = [origin.x / nx, origin.y / ny];
+            let places = Places { open, lattice: [across, along], place, cells: nx, level: seen };
+            torn = tear::erosion(simd, &places);
         }
 
         let ea = hits.of_quads(simd, all, |quad| quad.erosion[0]);

@@ -31,6 +31,7 @@ mod shell_scatter;
 mod shell_way;
 mod strand;
 mod strands;
+mod tear;
 mod walk;
 
 use fearless_simd::{Simd, dispatch};
