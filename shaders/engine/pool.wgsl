@@ -22,7 +22,7 @@ struct Wave {
     slope: f32,
     // 1 for a ring, 0 for a straight wave.
     ring: f32,
-    // Decay of a ring with the distance from its centre, 1/m; of a fine wave the side it is bent to, 1 or -1.
+    // Decay of a ring with the distance from its centre, 1/m.
     decay: f32,
     // Turns of the phase while the shutter is open.
     moves: f32,

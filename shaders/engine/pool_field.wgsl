@@ -92,9 +92,9 @@ fn field_normal(in: OpaquePoint, carried: vec4<f32>) -> vec3<f32> {
     return n / sqrt(dot3(n, n));
 }
 
-// A fine wave. Half of them are moved by `bend` metres along their direction and half against it.
+// A fine wave, which is moved by `bend` metres along its direction.
 fn fine_wave(wave: Wave, at: WavePlace, bend: f32) -> vec3<f32> {
-    let along = dot2(wave.toward, at.p) + wave.decay * bend;
+    let along = dot2(wave.toward, at.p) + bend;
     return rise(wave, wave.toward, along, wave.slope * at.churn, at);
 }
 

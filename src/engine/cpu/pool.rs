@@ -69,7 +69,7 @@ fn value_noise<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, origin: &Foam) -> F
 /// Returns the slopes of the surface along x and z at the points (x, z), metres, and the lift of its normal.
 /// `churn` scales the slopes. A wave fades out as `footprint`, the width of a pixel on the surface in metres,
 /// reaches half its length, because the pixel then sees the wave's mean. `time` is that of the samples.
-/// Beside a field, waves are moved by `bend` metres along or against their direction.
+/// Beside a field, waves are moved by `bend` metres along their direction.
 #[inline(always)]
 fn slopes<S: Simd>(
     simd: S,
@@ -98,7 +98,7 @@ fn slopes<S: Simd>(
             (away_x * inverse, away_z * inverse, away, blur * (one + away * splat(wave.decay)))
         } else {
             let along = tx * px + tz * pz;
-            let along = if let Some(bend) = bend { along + splat(wave.decay) * bend } else { along };
+            let along = if let Some(bend) = bend { along + bend } else { along };
             (tx, tz, along, blur)
         };
         let steep = splat(wave.slope) * churn / (thin * thin);

@@ -52,8 +52,7 @@ pub struct Wave {
     pub slope: f32,
     /// 1 for a ring, 0 for a straight wave.
     pub ring: f32,
-    /// Decay of a ring with the distance r from its centre, 1/m: the slope is divided by (1 + r·decay)². Of a
-    /// fine wave beside a field, the side it is bent to: 1 or −1.
+    /// Decay of a ring with the distance r from its centre, 1/m: the slope is divided by (1 + r·decay)².
     pub decay: f32,
     /// Turns of the phase while the shutter is open.
     pub moves: f32,
@@ -244,7 +243,6 @@ fn fine_waves(pool: &Pool, longest: f32, [flow, moves]: [f32; 2], origin: DVec3)
             k,
             phase: (phase - flow * turns(length, pool.period) + along.rem_euclid(1.0) as f32).rem_euclid(1.0),
             slope,
-            decay: if i % 2 == 0 { 1.0 } else { -1.0 },
             moves: -moves * turns(length, pool.period),
             ..Wave::default()
         };
