@@ -136,9 +136,8 @@ pub fn faces(pool: &Pool, basin: &Basin) -> Faces {
 fn potential(basin: &Basin, source: &[f32], drift: Vec2, length: f32) -> Vec<f32> {
     let grid = basin.grid;
     let h = grid.cell;
-    let mut phi = vec![0.0f32; grid.cells()];
     // Weight of the middle, and the constant part, of each cell.
-    let parts: Vec<[f32; 2]> = (0..phi.len())
+    let parts: Vec<[f32; 2]> = (0..grid.cells())
         .map(|i| {
             let mut weight = h * h / (length * length);
             let mut constant = h * h * source[i];
@@ -152,21 +151,24 @@ fn potential(basin: &Basin, source: &[f32], drift: Vec2, length: f32) -> Vec<f32
             [weight, constant]
         })
         .collect();
-    for _ in 0..RELAXATIONS {
-        for half in 0..2 {
-            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half).is_multiple_of(2))
-            {
-                if basin.solid[i] {
-                    continue;
+    // φ is 0 in rock and in a border around the grid, so every cell has four neighbours.
+    let [nx, nz] = grid.size;
+    let width = nx + 2;
+    let mut phi = vec![0.0f32; width * (nz + 2)];
+    for half in (0..2 * RELAXATIONS).map(|pass| pass % 2) {
+        for z in 0..nz {
+            for x in ((z + half) % 2..nx).step_by(2) {
+                let i = z * nx + x;
+                if !basin.solid[i] {
+                    let at = (z + 1) * width + x + 1;
+                    let sum = phi[at - 1] + phi[at + 1] + phi[at - width] + phi[at + width];
+                    let [weight, constant] = parts[i];
+                    phi[at] += OVER * ((sum - constant) / weight - phi[at]);
                 }
-                let open = grid.neighbours(i).into_iter().flatten().filter(|&j| !basin.solid[j]);
-                let sum: f32 = open.map(|j| phi[j]).sum();
-                let [weight, constant] = parts[i];
-                phi[i] += OVER * ((sum - constant) / weight - phi[i]);
             }
         }
     }
-    phi
+    (0..nz).flat_map(|z| phi[(z + 1) * width + 1..][..nx].to_vec()).collect()
 }
 
 /// Returns the stream function of the eddies at the corners of cells, m²/s: 0 at rock.

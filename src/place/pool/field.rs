@@ -8,7 +8,6 @@ use super::current::{self, Current};
 use super::waves;
 use super::{Pool, PoolWaves};
 use crate::place::Mesh;
-use crate::place::rock::wet::nearest_on_triangle;
 use crate::util::cache::Cache;
 
 /// Most cells along a side of the grid.
@@ -216,9 +215,12 @@ impl Basin {
 
     /// Returns the distance of a point from where water falls in, metres; infinite without such a place.
     pub fn from_impact(&self, p: Vec2) -> f32 {
-        let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
-        let away = |[a, b]: &[Vec2; 2]| nearest_on_triangle(at(p), [at(*a), at(*b), at(*b)]).distance(at(p));
-        self.impacts.iter().map(away).fold(f32::INFINITY, f32::min)
+        let away2 = |[a, b]: &[Vec2; 2]| {
+            let edge = *b - *a;
+            let along = ((p - *a).dot(edge) / edge.length_squared().max(1e-30)).clamp(0.0, 1.0);
+            (*a + edge * along).distance_squared(p)
+        };
+        self.impacts.iter().map(away2).fold(f32::INFINITY, f32::min).sqrt()
     }
 
     /// Gives solid cells the mean of what the cells beside them hold, `times` cells deep.

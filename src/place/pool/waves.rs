@@ -8,6 +8,8 @@
 
 use std::f32::consts::TAU;
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, dispatch};
 use glam::{DVec2, DVec3, Vec2};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -100,6 +102,42 @@ pub fn amplitudes(pool: &Pool, basin: &Basin, longest: f32, origin: DVec3) -> Ve
     out
 }
 
+/// What a step in time reads of three rows of cells, the one before, its own and the one after. Rows have a
+/// cell more on both ends.
+struct Stencil<'a> {
+    /// Heights.
+    u: [&'a [f32]; 3],
+    /// 1 in water, 0 in rock.
+    water: [&'a [f32]; 3],
+    /// γ·Δt of the own row.
+    damping: &'a [f32],
+}
+
+impl Stencil<'_> {
+    /// Replaces the heights of a step before by those of a step after. `squared` is (c·Δt)² in cells.
+    #[inline(always)]
+    fn step(&self, squared: f32, next: &mut [f32]) {
+        let nx = next.len() - 2;
+        // Slices of one length have no tests of bounds in the loop, so it is compiled to vectors.
+        let [low, own, high] = self.u;
+        let [low_water, own_water, high_water] = self.water;
+        let (west, east, u) = (&own[..nx], &own[2..nx + 2], &own[1..nx + 1]);
+        let (low, high) = (&low[1..nx + 1], &high[1..nx + 1]);
+        let (west_water, east_water) = (&own_water[..nx], &own_water[2..nx + 2]);
+        let water = &own_water[1..nx + 1];
+        let (low_water, high_water) = (&low_water[1..nx + 1], &high_water[1..nx + 1]);
+        let (damping, next) = (&self.damping[1..nx + 1], &mut next[1..nx + 1]);
+        for x in 0..nx {
+            let spread = west_water[x] * (west[x] - u[x])
+                + east_water[x] * (east[x] - u[x])
+                + low_water[x] * (low[x] - u[x])
+                + high_water[x] * (high[x] - u[x]);
+            let g = damping[x];
+            next[x] = water[x] * (2.0 * u[x] - (1.0 - g) * next[x] + squared * spread) / (1.0 + g);
+        }
+    }
+}
+
 /// A run in time.
 pub struct Run<'a> {
     basin: &'a Basin,
@@ -178,22 +216,17 @@ impl<'a> Run<'a> {
         let travel = (TRAVEL * self.longest / (self.courant * self.basin.grid.cell)) as usize;
         let steps = travel.min(MOST_STEPS) + self.period;
         let squared = self.courant * self.courant;
+        let simd = Level::new();
         for step in 0..steps {
             let rows = before.par_chunks_mut(width).enumerate().skip(1).take(nz).with_min_len(32);
             rows.for_each(|(z, next)| {
                 let at = z * width;
-                let row = |z: usize| (&now[z * width..][..width], &is_water[z * width..][..width]);
-                let ((low, low_water), (own, water), (high, high_water)) = (row(z - 1), row(z), row(z + 1));
-                let damped = &damping[at..at + width];
-                for x in 1..=nx {
-                    let u = own[x];
-                    let spread = water[x - 1] * (own[x - 1] - u)
-                        + water[x + 1] * (own[x + 1] - u)
-                        + low_water[x] * (low[x] - u)
-                        + high_water[x] * (high[x] - u);
-                    let g = damped[x];
-                    next[x] = water[x] * (2.0 * u - (1.0 - g) * next[x] + squared * spread) / (1.0 + g);
-                }
+                let stencil = Stencil {
+                    u: [z - 1, z, z + 1].map(|z| &now[z * width..][..width]),
+                    water: [z - 1, z, z + 1].map(|z| &is_water[z * width..][..width]),
+                    damping: &damping[at..at + width],
+                };
+                dispatch!(simd, simd => simd.vectorize(#[inline(always)] || stencil.step(squared, next)));
             });
             let ramp = (step as f32 / self.period as f32).min(1.0);
             let ramp = ramp * ramp * (3.0 - 2.0 * ramp);
@@ -204,15 +237,14 @@ impl<'a> Run<'a> {
             }
             std::mem::swap(&mut before, &mut now);
             if step >= steps - self.period {
-                let turn = self.turn(step + 1);
                 let share = 2.0 / self.period as f32;
+                let turn = self.turn(step + 1).map(|[re, im]| [re, -im]);
                 out.par_chunks_mut(nx).with_min_len(32).enumerate().for_each(|(z, out)| {
                     let own = &now[(z + 1) * width + 1..][..nx];
                     for (out, u) in out.iter_mut().zip(own) {
-                        for k in 0..MODES {
-                            out[k][0] += u * share * turn[k][0];
-                            out[k][1] -= u * share * turn[k][1];
-                        }
+                        let u = u * share;
+                        let sums = out.as_flattened_mut().iter_mut();
+                        sums.zip(turn.as_flattened()).for_each(|(sum, turn)| *sum += u * turn);
                     }
                 });
             }
