@@ -32,8 +32,8 @@ fn matter_at(quad: Quad, uv: vec2<f32>, torn: f32, coarse: bool) -> SheetDensity
     }
     let near = quad.erosion.x + (quad.erosion.y - quad.erosion.x) * uv.x;
     let far = quad.erosion.w + (quad.erosion.z - quad.erosion.w) * uv.x;
-    let even = clamp(near + (far - near) * uv.y, 0.0, 1.0);
-    let e = even + (1.0 - even) * torn;
+    let whole = clamp(near + (far - near) * uv.y, 0.0, 1.0);
+    let e = whole + (1.0 - whole) * torn;
     if quad.mist > 0.0 {
         let left = 1.0 - e;
         let shift = (1.0 - MIST_OF_CELLS) * MIST_RHO * left;

@@ -198,7 +198,7 @@ impl Sheet {
         let rows = self.rows();
         let (first, last) = (rows[0], rows[rows.len() - 1]);
         let across = self.across.as_dvec3();
-        let speed = Speed::new(self, rows.iter().map(|row| row.point.y));
+        let speed = Speed::new(self, self.stations().iter().map(|at| at.point.y));
         let out = (last.point - first.point).cross(across).normalize_or_zero();
         let borders = self.borders();
         let corner = |row: &Station, u: f32| {

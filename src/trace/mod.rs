@@ -5,7 +5,7 @@ mod levels;
 pub mod lines;
 pub mod lookup;
 mod matter;
-mod noise;
+pub(crate) mod noise;
 mod settings;
 pub mod tear;
 

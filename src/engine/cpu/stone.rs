@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::opaque::{Points, View, fresnel};
 use crate::place::stone::{COARSEST, CRACK, CRACK_SHARE, EDGE, GRADIENT, OCTAVES, STREAK, Stone};
 use crate::place::tiles::Tile;
+use crate::trace::noise::HASH;
 use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Words, floor_cell, signed, unsigned};
 
 /// Factor that gives the noise a deviation of 1.
@@ -19,9 +20,6 @@ struct Noise<S: Simd> {
     gradient: Lanes3<S>,
     value: Floats<S>,
 }
-
-/// Factors of a lattice point's coordinates in its hash.
-const HASH: [u32; 3] = [0x8da6_b343, 0xd816_3841, 0xcb1a_b31f];
 
 /// Adds the share of a corner at the distance `d` to a noise. `hashed` are the coordinates of the corner
 /// times [`HASH`].

@@ -3,6 +3,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 
+use crate::trace::noise::HASH;
 use crate::trace::tear::{INVERSE_DEVIATION, LEADS, LEVELS, OCTAVES, SOFT};
 use crate::util::lane_powers::log2;
 use crate::util::lanes::{Floats, Words, floor_cell, signed, unsigned};
@@ -42,9 +43,6 @@ fn around<S: Simd>(simd: S, cell: Floats<S>, period: Floats<S>, factor: u32) -> 
     let factor = u32x8::splat(simd, factor);
     [at, next].map(|at| unsigned(floor_cell(simd, at)) * factor)
 }
-
-/// Factors of a lattice point's coordinates in its hash.
-const HASH: [u32; 3] = [0x8da6_b343, 0xd816_3841, 0xcb1a_b31f];
 
 /// Share of the way to the next lattice point, smoothed, and the whole part of a coordinate.
 #[inline(always)]
