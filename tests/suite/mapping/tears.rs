@@ -24,7 +24,7 @@ fn a_free_fall_tears_as_it_thins_and_as_time_goes_by() {
 
 #[test]
 fn a_sheet_that_grows_narrow_as_it_grows_fast_is_not_torn() {
-    // 2 m at 1 m/s become 0.2 m at 10 m/s: the thickness stays.
+    // 2 m at 1 m/s become 0.1 m at 10 m/s, so the sheet is twice as thick.
     let foot = 3.0 - 99.0 / (2.0 * GRAVITY);
     let text = format!(
         "[sheets.a]\npoints = [[0, 3, 0], [0, {foot}, 0]]\nwidths = [2.0, 0.1]\nv0 = 1.0\ntear = 1.0\n"
