@@ -56,7 +56,7 @@ struct FrameUniforms {
     haze_color: vec3<f32>,
     // Metres of haze in front of the background.
     haze_far: f32,
-    // Number of the light that rock shadows rock from; 0xffffffff if there is none.
+    // Number of the light that rock casts shadows from; 0xffffffff if there is none.
     shadow_light: u32,
     // Number of levels of the volume, itself included.
     levels: u32,
@@ -133,6 +133,10 @@ struct Quad {
     // Holes: shares that are torn at v = 0 and v = 1, and the holes' cells across a copy of the volume and
     // along it.
     tear: vec4<f32>,
+    // Shares of the surroundings' light and of the light that casts shadows that the quad loses, each at
+    // (0, 0), (1, 0), (1, 1) and (0, 1).
+    occlusion: vec4<f32>,
+    shadow: vec4<f32>,
     // Billows of mist: strength, reciprocal size in 1/m, metres of rise in a loop, and padding.
     billow: vec4<f32>,
 }

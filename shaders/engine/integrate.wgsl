@@ -360,7 +360,7 @@ fn trace(
     }
     view.hit = SheetHit(jacobian, quad.e1, quad.e2, quad.n, side, d_world, point_world(quad, hit.xy),
         view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, own.cells.z,
-        view.profile, column);
+        view.profile, column, light_left(quad, hit.xy));
     view.lights = arrayLength(&lights);
 
     // The level whose cells match the sample's footprint lies between two levels; both are walked.
@@ -429,9 +429,10 @@ fn trace(
     // The weights of the ambient light add up: Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end.
     let ends = is_last | (end < view.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    var color = ambient_of((quad.mist > 0.0) | !is_strand(own)) * (before.w - end) + passed;
+    let sky_left = view.hit.left.sky;
+    var color = ambient_of((quad.mist > 0.0) | !is_strand(own)) * sky_left * (before.w - end) + passed;
     if COLORED {
-        color += frame.ambient * tint;
+        color += frame.ambient * sky_left * tint;
     }
     if (LIGHTS == 1u) & IN_COLOUR {
         color += view.light.intensity * light;

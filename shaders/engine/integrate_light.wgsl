@@ -63,6 +63,34 @@ struct SheetHit {
     // Index at which the quad's profile begins, and the eye's column in its gains.
     profile: u32,
     column: GainColumn,
+    left: LightLeft,
+}
+
+// Shares of the light that shade leaves.
+struct LightLeft {
+    // That of the surroundings, and that of the light that casts shadows.
+    sky: f32,
+    sun: f32,
+    // Number of that light, and of the scene's own lights, which those of the surroundings follow.
+    shadow_light: u32,
+    own: u32,
+}
+
+// Shares of the light that the shade on a quad leaves. Twin: QuadShade::left of src/place/water_shade.rs.
+fn light_left(quad: Quad, uv: vec2<f32>) -> LightLeft {
+    return LightLeft(share_left(quad.occlusion, uv), share_left(quad.shadow, uv), frame.shadow_light,
+        frame.light_count);
+}
+
+fn share_left(corners: vec4<f32>, uv: vec2<f32>) -> f32 {
+    let near = corners.x + (corners.y - corners.x) * uv.x;
+    let far = corners.w + (corners.z - corners.w) * uv.x;
+    return 1.0 - clamp(near + (far - near) * uv.y, 0.0, 1.0);
+}
+
+// Share that is left of light number `i`.
+fn left_of(left: LightLeft, i: u32) -> f32 {
+    return select(select(1.0, left.sky, i >= left.own), left.sun, i == left.shadow_light);
 }
 
 // Values of a cell that all lights share.
@@ -93,7 +121,7 @@ fn ray_light(i: u32, hit: SheetHit, level: Level, count: u32) -> RayLight {
     let l_n = dot3(to_light, hit.n) * hit.side;
     let l = vec3<f32>(dot3(to_light, hit.e1), dot3(to_light, hit.e2), l_n);
     var out: RayLight;
-    out.intensity = light.intensity * arrives.w;
+    out.intensity = light.intensity * arrives.w * left_of(hit.left, i);
     out.l_cell = cell_from_plane(hit.jacobian, l);
     out.l_v = transposed(hit.jacobian, l);
     if hit.texture_frame {

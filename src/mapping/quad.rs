@@ -17,6 +17,8 @@ pub struct Quad {
     pub offset: Vec2,
     /// Erosion e at A, B, C and D, bilinear between them. It leaves max(ρ − e, 0) of the density ρ.
     pub erosion: [f32; 4],
+    /// Erosion at A, B, C and D without that between surges, which changes with time.
+    pub worn: [f32; 4],
     /// Holes in the water.
     pub tear: Tear,
     /// Ψ of mist, which replaces that of the cells. With 0 the quad is not mist.
@@ -37,6 +39,7 @@ impl Quad {
             material,
             offset: Vec2::ZERO,
             erosion: [0.0; 4],
+            worn: [0.0; 4],
             tear: Tear::default(),
             mist: 0.0,
         })
@@ -76,6 +79,7 @@ impl Quad {
             material,
             offset,
             erosion: [0.0; 4],
+            worn: [0.0; 4],
             tear: Tear::default(),
             mist: 0.0,
         })

@@ -225,13 +225,12 @@ impl Sheet {
                 let extent = (to - from).as_vec2();
                 let material = Material { repeat_u: extent.x, repeat_v: extent.y, ..self.material };
                 let way = |row: usize| (ends[row].arc / last.arc) as f32;
-                let erosion = at.map(|(row, u)| {
-                    let e = self.ends.erosion(u, way(row));
-                    e + (1.0 - e) * self.surges.lack(u, texture(&ends[row], u).y)
-                });
+                let worn = at.map(|(row, u)| self.ends.erosion(u, way(row)));
+                let lack = at.map(|(row, u)| self.surges.lack(u, texture(&ends[row], u).y));
+                let erosion = std::array::from_fn(|i| worn[i] + (1.0 - worn[i]) * lack[i]);
                 let tear = Tear { open: [torn[segment], torn[segment + 1]], lattice };
                 let (offset, mist) = (from.as_vec2(), self.mist);
-                quads.push(Quad { corners, map, material, offset, erosion, tear, mist });
+                quads.push(Quad { corners, map, material, offset, erosion, worn, tear, mist });
             }
         }
         Ok(quads)

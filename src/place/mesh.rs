@@ -8,13 +8,17 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::bvh::Bvh;
 use super::paint::{Painting, Paints, texture};
 use super::pool::Pool;
 use super::pool::field::{FIELD_VERSION, PoolField};
+use super::rock::shade::{self, Sky, Sun};
 use super::rock::stone::Stone;
-use super::rock::{Rock, shade, wet};
+use super::rock::veil::Veils;
+use super::rock::{Rock, wet};
 use super::tiles::{self, Tile};
 use super::triangles::{MeshShade, ShadeMemo, WaterFaces, kinds};
+use super::water_shade::{QuadShade, ShadedWater, WATER_SHADE_VERSION};
 use crate::place::Vertex;
 use crate::util::cache::{Cache, key};
 
@@ -45,6 +49,8 @@ pub struct Mesh {
     pub stones: Arc<Vec<Stone>>,
     /// Waves and foam of each pool that has a field of them, by the pool's number; empty without pools.
     pub fields: Arc<Vec<Option<PoolField>>>,
+    /// Shade on each quad of falling water; empty where there is none.
+    pub on_water: Arc<Vec<QuadShade>>,
 }
 
 impl Mesh {
@@ -76,12 +82,12 @@ impl Mesh {
     }
 
     /// Adds the triangles of other meshes.
-    pub fn with_triangles(self, soups: &[Triangles]) -> Mesh {
+    pub fn with_triangles(mut self, soups: &[Triangles]) -> Mesh {
         if soups.is_empty() {
             return self;
         }
-        let mut vertices = Arc::unwrap_or_clone(self.vertices);
-        let mut tiles = Arc::unwrap_or_clone(self.tiles);
+        let mut vertices = Arc::unwrap_or_clone(std::mem::take(&mut self.vertices));
+        let mut tiles = Arc::unwrap_or_clone(std::mem::take(&mut self.tiles));
         let paintings = soups.iter().filter_map(|own| own.painting.as_deref());
         let (paints, firsts) = Paints::join(paintings, texture::MOST_BYTES);
         let mut firsts = firsts.into_iter();
@@ -104,13 +110,7 @@ impl Mesh {
                 }));
             }
         }
-        Mesh {
-            vertices: Arc::new(vertices),
-            tiles: Arc::new(tiles),
-            paints: Arc::new(paints),
-            stones: self.stones,
-            fields: self.fields,
-        }
+        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles), paints: Arc::new(paints), ..self }
     }
 
     /// Returns the field of waves and foam of a pool, given by its index, if it has one.
@@ -158,6 +158,8 @@ pub struct Ground {
     pub triangles: Vec<Triangles>,
     /// Triangles around shells of water; empty where nothing can be wet.
     pub water_faces: WaterFaces,
+    /// Falling water that is shaded.
+    pub shaded_water: ShadedWater,
     /// Unit vector to the light that makes rocks and meshes cast shadows; `None` where none is shaded.
     pub sun: Option<Vec3>,
     /// The place in the world from which positions are measured, metres. Beds of rock are fixed to the world.
@@ -167,7 +169,8 @@ pub struct Ground {
 impl Ground {
     /// Builds the mesh. `memo` holds parts of what was built last.
     pub fn mesh(&self, memo: &ShadeMemo) -> Mesh {
-        self.with_fields(self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None), None)
+        let mesh = self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None);
+        self.with_water(self.with_fields(mesh, None), memo, None)
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
@@ -177,7 +180,7 @@ impl Ground {
         let key = key("mesh", BUILDER_VERSION, &self.of_grids());
         let Ok(vertices) = cache.get("meshes", &key, count, make);
         let mesh = self.with_meshes(self.grid_mesh(vertices), memo, Some(cache));
-        self.with_fields(mesh, Some(cache))
+        self.with_water(self.with_fields(mesh, Some(cache)), memo, Some(cache))
     }
 
     /// Makes the mesh of rocks and pools of their vertices.
@@ -198,6 +201,53 @@ impl Ground {
         let fields: Vec<Option<PoolField>> = self.pools.iter().map(field).collect();
         mesh.fields = Arc::new(fields);
         mesh
+    }
+
+    /// Adds the shade on falling water to the mesh, from `cache` where it is stored there.
+    fn with_water(&self, mut mesh: Mesh, memo: &ShadeMemo, cache: Option<&Cache>) -> Mesh {
+        let water = &self.shaded_water;
+        if water.veils.is_empty() {
+            return mesh;
+        }
+        let rocks: Vec<(&Rock, Range<usize>)> = self.rocks.iter().zip(self.ranges()).collect();
+        let make = || {
+            let has =
+                |amount: fn(&MeshShade) -> f32| self.triangles.iter().any(|own| amount(&own.shade) > 0.0);
+            let blocks = [has(|shade| shade.occlusion), has(|shade| shade.shadow)];
+            let casters = (blocks != [false; 2]).then(|| self.casters(memo, &mesh.vertices));
+            let [of_sky, of_sun] = self.blockers(casters.as_deref(), blocks);
+            let sky = Sky::new(&rocks, &mesh.vertices, of_sky.as_ref());
+            let sun =
+                self.sun.and_then(|to_sun| Sun::new(&rocks, &mesh.vertices, to_sun, of_sun.as_ref(), None));
+            Ok::<_, Infallible>(water.shades(sky.as_ref(), sun.as_ref()))
+        };
+        let Ok(shades) = match cache {
+            Some(cache) => {
+                let key = key("shade on water", WATER_SHADE_VERSION, self);
+                cache.get("meshes", &key, water.veils.len(), make)
+            }
+            None => make(),
+        };
+        mesh.on_water = Arc::new(shades);
+        mesh
+    }
+
+    /// What meshes block of the surroundings' light and of the sun's, where `is_asked`.
+    fn blockers<'a>(
+        &self,
+        casters: Option<&'a Bvh>,
+        is_asked: [bool; 2],
+    ) -> [Option<impl Fn(Vec3, Vec3) -> bool + Sync + use<'a>>; 2] {
+        let of = |kinds: u8, is_asked: bool| {
+            let bvh = casters.filter(|_| is_asked)?;
+            Some(move |from: Vec3, direction: Vec3| bvh.is_hit(from, direction, kinds))
+        };
+        [of(kinds::MESH_OCCLUSION, is_asked[0]), of(kinds::MESH_SHADOW, is_asked[1])]
+    }
+
+    /// Falling water as the sun sees it, if it casts a shadow.
+    pub(super) fn veils(&self) -> Option<Veils> {
+        Veils::new(&self.shaded_water, self.sun?)
     }
 
     /// Everything that determines the vertices of rocks and pools.
@@ -251,17 +301,15 @@ impl Ground {
         };
         let [blocks_sky, blocks_sun] = self.meshes_that_shade();
         let casters = (blocks_sky || blocks_sun).then(|| self.casters(memo, vertices));
-        let blockers = |kinds: u8, is_asked: bool| {
-            let bvh = casters.as_deref().filter(|_| is_asked)?;
-            Some(move |from: Vec3, direction: Vec3| bvh.is_hit(from, direction, kinds))
-        };
-        let of_sky = blockers(kinds::MESH_OCCLUSION, blocks_sky);
-        let sky = shaded(|rock| rock.occlusion, |mesh| mesh.occlusion);
-        shade::occlude(&rocks, &sky, vertices, of_sky.as_ref());
-        if let Some(to_sun) = self.sun {
-            let of_sun = blockers(kinds::MESH_SHADOW, blocks_sun);
-            let sun = shaded(|rock| rock.shadow, |mesh| mesh.shadow);
-            shade::shadow(&rocks, &sun, vertices, to_sun, of_sun.as_ref());
+        let [of_sky, of_sun] = self.blockers(casters.as_deref(), [blocks_sky, blocks_sun]);
+        if let Some(sky) = Sky::new(&rocks, vertices, of_sky.as_ref()) {
+            sky.occlude(&shaded(|rock| rock.occlusion, |mesh| mesh.occlusion), vertices);
+        }
+        let veils = self.veils();
+        if let Some(to_sun) = self.sun
+            && let Some(sun) = Sun::new(&rocks, vertices, to_sun, of_sun.as_ref(), veils.as_ref())
+        {
+            sun.shadow(&shaded(|rock| rock.shadow, |mesh| mesh.shadow), vertices);
         }
         wet::wet(&rocks, vertices, &self.water, &self.water_faces, &self.pools);
         std::mem::take(vertices)

@@ -67,7 +67,8 @@ use crate::picture::{AutoExposure, Camera, Image, Lens, check_image};
 use crate::place::paint::coarsened;
 use crate::place::paint::texture::MOST_BYTES;
 use crate::place::{
-    DiffuseKey, DiffuseOfShells, Ground, Mesh, Pool, Rock, ShadeMemo, ShellShadows, Triangles, WaterFaces,
+    DiffuseKey, DiffuseOfShells, Ground, Mesh, Pool, Rock, ShadeMemo, ShadedWater, ShellShadows, Triangles,
+    Veil, WaterFaces,
 };
 use crate::trace::{Attenuation, Trace, pyramid_spec};
 use crate::util::cache::Cache;
@@ -125,6 +126,9 @@ pub struct Parts {
     pub environment_lights: Vec<Light>,
     /// Light from everywhere, linear RGB.
     pub ambient: Vec3,
+    /// Shares of the surroundings' light and of the sun's that falling water loses where rocks and meshes
+    /// hide them, 0 to 1. The second is also the strength of the water's own shadow.
+    pub water_shade: [f32; 2],
     /// Opaque rocks.
     pub rocks: Vec<Rock>,
     /// Level water, opaque too.
@@ -336,6 +340,7 @@ impl Scene {
             environment_lights,
             environment,
             ambient: v.triple("light.ambient"),
+            water_shade: [v.float("light.occlusion"), v.float("light.shadow")],
             rocks: ground::rocks(v, origin, limits.memory)?,
             pools: ground::pools(v, origin)?,
             triangles: surfaces.triangles,
@@ -540,7 +545,17 @@ impl Scene {
         let shaded =
             self.rocks.iter().any(|rock| rock.shadow > 0.0) || shades().any(|shade| shade.shadow > 0.0);
         let sun = self.shadow_light().filter(|_| shaded).map(|i| self.lights[i].at(Vec3::ZERO).0);
+        let is_hidden =
+            shades().any(|shade| shade.occlusion > 0.0) || self.rocks.iter().any(|rock| rock.occlusion > 0.0);
+        let [occlusion, shadow] = self.water_shade;
+        let occlusion = if is_hidden { occlusion } else { 0.0 };
+        let shadow = if shaded { shadow } else { 0.0 };
+        let veils = match occlusion > 0.0 || shadow > 0.0 {
+            true => self.quads.iter().map(Veil::of).collect(),
+            false => Vec::new(),
+        };
         Ground {
+            shaded_water: ShadedWater { occlusion, shadow, veils },
             rocks: self.rocks.clone(),
             pools: self.pools.clone(),
             triangles: self.triangles.clone(),

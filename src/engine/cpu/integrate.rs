@@ -26,7 +26,7 @@ use crate::mapping::shell::Inside;
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
 use crate::picture::{Camera, SampleTimes};
-use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
+use crate::place::{DiffuseOfShells, Mesh, QuadShade, ShellShadows};
 use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, STRANDS, StrandTurn, level_at};
 use crate::trace::{Attenuation, BillowTimes, Prefilter, SheetDensity, billow, extinction, flow_cells, tear};
@@ -49,6 +49,8 @@ pub struct Integrator<'a> {
     /// Footprint of a sample; see [`footprint`].
     footprint: f32,
     lights: Vec<Light>,
+    /// Number of the light that casts shadows, if there is one.
+    shadow_light: Option<usize>,
     /// Visibility of the scene, or `Cached` where light volumes stand for walks to the lights.
     visibility: Visibility,
     light_volumes: Option<LightVolumes>,
@@ -58,6 +60,8 @@ pub struct Integrator<'a> {
     shell_light: Option<Arc<ShellLight>>,
     /// Shadows of opaque matter on shells, if there are any.
     shell_shadows: Option<Arc<ShellShadows>>,
+    /// Shade on each quad; empty where there is none.
+    on_water: Arc<Vec<QuadShade>>,
     /// How light scatters many times in the shells of each volume, if it does.
     optics: Vec<Option<ShellOptics>>,
     /// J in each shell, if light scatters many times in any.
@@ -170,6 +174,38 @@ struct SheetHit<'a> {
 impl SheetHit<'_> {
     fn matter(&self, level: &Level) -> &SheetDensity {
         &self.matter[usize::from(!level.is_whole)]
+    }
+}
+
+/// Place where a ray meets a sheet.
+struct SheetPlace {
+    /// Number of the quad.
+    quad: usize,
+    uv: Vec2,
+    /// Point in the world, metres.
+    point: Vec3,
+}
+
+/// Shares of the light that shade leaves.
+struct LightLeft {
+    /// That of the surroundings.
+    sky: f32,
+    /// That of the light that casts shadows.
+    sun: f32,
+    shadow_light: Option<usize>,
+    /// Number of the scene's own lights, which those of the surroundings follow.
+    own: usize,
+}
+
+impl LightLeft {
+    /// Share that is left of light number `i`.
+    #[inline]
+    fn of(&self, i: usize) -> f32 {
+        match self.shadow_light {
+            Some(light) if light == i => self.sun,
+            _ if i >= self.own => self.sky,
+            _ => 1.0,
+        }
     }
 }
 
@@ -307,7 +343,8 @@ impl<'a> Integrator<'a> {
     }
 
     /// Returns the integrator with the shadows that the scene's opaque `mesh` and the skins of shells cast on
-    /// shells, and with the diffuse light in shells. Only [`Integrator::prepared`] has them already.
+    /// shells, with the shade on falling water, and with the diffuse light in shells. Only
+    /// [`Integrator::prepared`] has them already.
     ///
     /// # Errors
     /// Errors of `monitor`, which may stop the work.
@@ -320,7 +357,7 @@ impl<'a> Integrator<'a> {
         let shell_shadows = self.scene.shadows_on_shells(mesh, monitor)?;
         let shadows = shell_shadows.as_ref();
         let diffuse = self.scene.diffuse_on_shells(volumes.as_ref(), mesh, shadows, monitor)?;
-        Ok(Integrator { shell_shadows, diffuse, ..self })
+        Ok(Integrator { shell_shadows, on_water: mesh.on_water.clone(), diffuse, ..self })
     }
 
     /// Prepares a scene and its volumes for a few rays. With cached visibility, the values of light volumes
@@ -366,12 +403,14 @@ impl<'a> Integrator<'a> {
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             footprint: footprint(&scene.camera, &scene.image),
             lights: scene.volume_lights(),
+            shadow_light: scene.shadow_light(),
             light_volumes: (scene.visibility == Visibility::Cached)
                 .then(|| scene.light_volumes(volumes, u64::MAX).expect("the largest budget fits")),
             visibility: scene.visibility,
             filled: None,
             shell_light: None,
             shell_shadows: None,
+            on_water: Arc::default(),
             optics: scene.shell_optics(volumes),
             diffuse: None,
             kept_in: scene
@@ -516,8 +555,8 @@ impl<'a> Integrator<'a> {
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, tint, cells } = result;
-        let is_mist = ray.matter[0].mist > 0.0;
-        self.composed((ray.point, ray.volume, is_mist), transmittance, cells, (&lit, tint), order)
+        let place = SheetPlace { quad, uv: ray.uv, point: ray.point };
+        self.composed(&place, transmittance, cells, (&lit, tint), order)
     }
 
     /// Walks level `number` of a ray's volume, or its strands, which are level [`STRANDS`].
@@ -535,13 +574,12 @@ impl<'a> Integrator<'a> {
         self.walk(ray, &Level::new(levels, number as u32), before, observer)
     }
 
-    /// Result of a sheet of a volume, of mist or not, that a ray meets at `point` of the world and that lets
-    /// `transmittance` pass, in which the lights send `lit` to the eye. The second part of `lit` is
-    /// [`LevelResult::tint`].
+    /// Result of a sheet that a ray meets at a place and that lets `transmittance` pass, in which the lights
+    /// send `lit` to the eye. The second part of `lit` is [`LevelResult::tint`].
     #[inline]
     fn composed(
         &self,
-        (point, volume, is_mist): (Vec3, usize, bool),
+        place: &SheetPlace,
         transmittance: f32,
         cells: [u32; 2],
         (lit, tint): (&[Lit], Vec3),
@@ -549,16 +587,26 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let mut radiance = self.ambient_of(volume, is_mist) * (before - transmittance) + passed;
+        let quad = &self.scene.quads[place.quad];
+        let shares = self.light_left(place.quad, place.uv);
+        let ambient = self.ambient_of(quad.material.volume as usize, quad.mist > 0.0) * shares.sky;
+        let mut radiance = ambient * (before - transmittance) + passed;
         if self.is_colored {
-            radiance += self.scene.ambient * tint;
+            radiance += self.scene.ambient * shares.sky * tint;
         }
-        for (light, lit) in self.lights.iter().zip(lit) {
-            let (_, intensity) = light.at(point);
+        for (i, (light, lit)) in self.lights.iter().zip(lit).enumerate() {
+            let intensity = light.at(place.point).1 * shares.of(i);
             let sum = if self.in_colour() { lit.colour } else { Vec3::splat(lit.sum * (1.0 / 255.0)) };
             radiance += intensity * sum;
         }
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
+    }
+
+    /// Shares of the light that the shade on quad number `quad` leaves at `uv`.
+    #[inline]
+    fn light_left(&self, quad: usize, uv: Vec2) -> LightLeft {
+        let [sky, sun] = self.on_water.get(quad).map_or([1.0; 2], |shade| shade.left(uv));
+        LightLeft { sky, sun, shadow_light: self.shadow_light, own: self.scene.lights.len() }
     }
 
     /// Ambient light that cells of a volume, of mist or not, send on.

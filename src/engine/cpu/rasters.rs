@@ -147,7 +147,9 @@ impl Rasters {
 }
 
 fn is_same_mesh(a: &Mesh, b: &Mesh) -> bool {
-    Arc::ptr_eq(&a.vertices, &b.vertices) && Arc::ptr_eq(&a.tiles, &b.tiles)
+    Arc::ptr_eq(&a.vertices, &b.vertices)
+        && Arc::ptr_eq(&a.tiles, &b.tiles)
+        && Arc::ptr_eq(&a.on_water, &b.on_water)
 }
 
 /// Whether the raster pass of sample `sample` gives the same for two scenes with the same mesh, except the
@@ -167,6 +169,8 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         environment,
         environment_lights: _,
         ambient,
+        // The shade on water is in the mesh.
+        water_shade: _,
         // Rocks and triangles are in the mesh.
         rocks: _,
         triangles: _,

@@ -138,7 +138,8 @@ pub fn inspect(
     let trace = &mut plain.edit().trace;
     (trace.filter, trace.lookup) = (Prefilter::None, Lookup::Nearest);
     let mut integrator = Integrator::new(&plain, volumes);
-    if faces.iter().any(|face| matches!(scene.face(face.quad), Face::Hull(..))) {
+    let is_shaded = !mesh.on_water.is_empty();
+    if is_shaded || faces.iter().any(|face| matches!(scene.face(face.quad), Face::Hull(..))) {
         let shaded = integrator.with_shadows_of(volumes, mesh, &Unwatched);
         integrator = shaded.expect("nobody stops the work");
     }

@@ -11,6 +11,7 @@ use crate::light::strand::table::StrandShading;
 use crate::light::{AngleFrame, environment, ramp, scatter};
 use crate::mapping::{Billow, PlaneView, Tear};
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
+use crate::place::QuadShade;
 use crate::scene::{MAX_VOLUMES, Scene};
 use crate::trace::lookup::StrandTurn;
 use crate::trace::{BillowTimes, extinction, flow_cells, level_atlas};
@@ -157,6 +158,8 @@ pub struct Quad {
     pub a: [f32; 3],
     pub mist: f32,
     pub tear: [f32; 4],
+    pub occlusion: [f32; 4],
+    pub shadow: [f32; 4],
     pub billow: [f32; 4],
 }
 
@@ -571,9 +574,9 @@ impl Light {
 }
 
 impl Quad {
-    /// Packs a quad as the eye of a scene sees it. `profile` is the index at which the profile of its
-    /// material begins.
-    pub fn new(quad: &crate::mapping::Quad, scene: &Scene, profile: u32) -> Self {
+    /// Packs a quad as the eye of a scene sees it, in a shade. `profile` is the index at which the profile of
+    /// its material begins.
+    pub fn new(quad: &crate::mapping::Quad, scene: &Scene, profile: u32, shade: &QuadShade) -> Self {
         let map = &quad.map;
         let rays = scene.camera.rays(scene.image.width, scene.image.height);
         let plane = PlaneView::of_quad(map, scene.camera.eye_local(), rays);
@@ -602,6 +605,8 @@ impl Quad {
                 let Tear { open: [near, far], lattice: [across, along] } = quad.tear;
                 [near, far, across as f32, along as f32]
             },
+            occlusion: shade.occlusion,
+            shadow: shade.shadow,
             billow: {
                 let Billow { strength, inverse_size, rise } = quad.material.billow;
                 [strength, inverse_size, rise, 0.0]

@@ -205,9 +205,12 @@ impl Uploaded {
                 "give materials the same thickness and sheets the same mist, or use --engine cpu",
             ));
         }
-        let numbered = scene.quads.iter().zip(medium_of_quad);
-        let quads: Vec<Quad> =
-            numbered.map(|(quad, which)| Quad::new(quad, scene, profiles[which as usize])).collect();
+        let numbered = scene.quads.iter().zip(medium_of_quad).enumerate();
+        let quad = |(i, (quad, which)): (usize, (&crate::mapping::Quad, u32))| {
+            let shade = mesh.on_water.get(i).copied().unwrap_or_default();
+            Quad::new(quad, scene, profiles[which as usize], &shade)
+        };
+        let quads: Vec<Quad> = numbered.map(quad).collect();
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));

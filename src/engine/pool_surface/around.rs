@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::{AROUND, turn};
 use crate::mapping::Quad;
-use crate::place::{Mesh, Vertex};
+use crate::place::{Mesh, Vertex, WATER_COVER};
 use crate::scene::Scene;
 use crate::trace::tear;
 
@@ -17,8 +17,6 @@ const BEHIND: f32 = 1.4;
 const POINTS: u32 = 6;
 /// Share of the lights' irradiance that white water reflects.
 const WATER_REFLECTANCE: f32 = 0.35;
-/// Largest share of a cell that white water covers.
-const WATER_COVER: f32 = 0.75;
 
 /// Returns the cell of a unit direction; `None` below the horizon. The lookup, which interpolates between
 /// cells, is `around` of `shaders/engine/pool.wgsl`.
@@ -72,7 +70,7 @@ pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROU
             }
         }
     }
-    add_water(scene, middle, &mut cells);
+    add_water(scene, mesh, middle, &mut cells);
     let near: Vec<f32> = nearest.iter().copied().filter(|d| d.is_finite()).collect();
     let radius = if near.is_empty() { 1e4 } else { near.iter().sum::<f32>() / near.len() as f32 };
     (radius, cells)
@@ -92,10 +90,23 @@ fn radiance(scene: &Scene, vertex: &Vertex) -> Vec3 {
 }
 
 /// Composites falling water over the cells.
-fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
+fn add_water(scene: &Scene, mesh: &Mesh, middle: Vec3, cells: &mut [[f32; 4]]) {
     let solid_angle = std::f32::consts::TAU / cells.len() as f32;
+    let mut sky = scene.ambient;
+    if let Some(environment) = &scene.environment {
+        sky += environment.irradiance.at(Vec3::Y);
+    }
+    let lights = scene.lights.iter().map(|light| light.at(middle).1 * WATER_REFLECTANCE);
+    let lights: Vec<Vec3> = lights.collect();
+    let sun = scene.shadow_light().map_or(Vec3::ZERO, |i| lights[i]);
+    let white = lights.iter().fold(sky, |sum, light| sum + *light);
     let mut cover = vec![0.0f32; cells.len()];
-    for quad in scene.quads.iter().filter(|quad| quad.mist == 0.0) {
+    // What shade takes from the light of the water in each cell.
+    let mut lost = vec![Vec3::ZERO; cells.len()];
+    for (i, quad) in scene.quads.iter().enumerate().filter(|(_, quad)| quad.mist == 0.0) {
+        let shade = mesh.on_water.get(i).copied().unwrap_or_default();
+        let [occlusion, shadow] = [shade.occlusion, shade.shadow].map(|all| all.iter().sum::<f32>() / 4.0);
+        let dark = sky * occlusion + sun * shadow;
         let Quad { corners: [a, b, c, d], erosion, tear, .. } = quad;
         let area = (*c - *a).cross(*d - *b).length() * 0.5 / (POINTS * POINTS) as f32;
         let whole = 1.0 - tear.open.map(tear::mean).iter().sum::<f32>() / 2.0;
@@ -107,18 +118,14 @@ fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
             let distance = away.length().max(1e-3);
             if let Some(cell) = cell(away / distance) {
                 let facing = away.dot(quad.map.n_world).abs() / distance;
-                cover[cell] += share_left * area * facing / (distance * distance * solid_angle);
+                let more = share_left * area * facing / (distance * distance * solid_angle);
+                cover[cell] += more;
+                lost[cell] += dark * more;
             }
         }
     }
-    let mut white = scene.ambient;
-    if let Some(environment) = &scene.environment {
-        white += environment.irradiance.at(Vec3::Y);
-    }
-    for light in &scene.lights {
-        white += light.at(middle).1 * WATER_REFLECTANCE;
-    }
-    for (cell, cover) in cells.iter_mut().zip(cover) {
+    for ((cell, cover), lost) in cells.iter_mut().zip(cover).zip(lost) {
+        let white = white - lost / cover.max(1e-30);
         let cover = cover.min(WATER_COVER);
         let [r, g, b, behind] = *cell;
         let mixed = Vec3::new(r, g, b) * (1.0 - cover) + white * cover;

@@ -6,6 +6,7 @@ mod patch;
 pub mod shade;
 pub mod stone;
 mod strata;
+pub mod veil;
 pub mod wet;
 
 use glam::{DVec3, Vec3};

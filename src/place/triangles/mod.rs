@@ -213,7 +213,7 @@ impl Ground {
             };
             each().map(of).collect()
         });
-        let water = self.water_around_meshes();
+        let (water, veils) = (self.water_around_meshes(), self.veils());
         let mut coats = Vec::with_capacity(3 * count);
         for (mesh, (own, welded)) in each().enumerate() {
             let shade = self.triangles[mesh].shade;
@@ -223,6 +223,13 @@ impl Ground {
                     bake::shadow(&own.vertices, &kept.lifts[mesh], welded, &casters, kinds, to_sun, count)
                 }
                 _ => Vec::new(),
+            };
+            let shadow = match &veils {
+                Some(veils) if shade.shadow > 0.0 => {
+                    let points = welded.corners.par_iter().map(|i| own.vertices[*i as usize].position.into());
+                    points.zip(shadow).map(|(p, shadow)| 1.0 - (1.0 - shadow) * veils.pass(p)).collect()
+                }
+                _ => shadow,
             };
             let wet: Vec<f32> = match shade.wet > 0.0 {
                 true => {

@@ -73,6 +73,19 @@ pub(super) const LIGHT: Group = Group {
                 "Raise it when shadows are too black; lower it to 0 under an environment, which fills \
                  them itself.",
             ),
+        p("light.occlusion", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Share of the surroundings' light that water on quads loses where rocks and meshes with \
+                 `occlusion` above 0 hide them. Volumes in boxes and on shells do without it.",
+            )
+            .when("Raise it when water in a gorge or a cave is as bright as under the open sky."),
+        p("light.shadow", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Share of the brightest directional light that water on quads loses in the shadow of rocks \
+                 and meshes with `shadow` above 0, and strength of the shadow that the water casts on them \
+                 and on pools. Volumes in boxes and on shells do without it.",
+            )
+            .when("Raise it to 1 when the sun shines through rock on water, or water casts no shadow."),
     ],
 };
 

@@ -172,7 +172,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
     let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v across height along profile normal
-        volume e f g offset erosion a mist tear billow);
+        volume e f g offset erosion a mist tear occlusion shadow billow);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));

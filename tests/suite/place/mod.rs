@@ -7,6 +7,7 @@ pub mod pool_field;
 pub mod stone;
 pub mod tiles;
 pub mod triangles;
+pub mod water_shade;
 
 use std::f32::consts::PI;
 use std::path::Path;
@@ -42,11 +43,16 @@ fn of(text: &str) -> Scene {
 /// A smooth floor of 20 m × 20 m around the origin, with a wall of height 4 m on its line x = 0 that faces
 /// +x.
 fn floor_and_wall(more: &str) -> Scene {
+    floor_and_wall_with(more, "")
+}
+
+/// The same with `rest` in the scene.
+fn floor_and_wall_with(more: &str, rest: &str) -> Scene {
     let rock = "amplitude = 0.0\nlevels = 7\ncavity = 0.0\ncolor_noise = 0.0\n";
     of(&format!(
         "[rocks.floor]\ncorners = [[-10,0,10],[10,0,10],[10,0,-10],[-10,0,-10]]\n{rock}{more}\n\
          [rocks.wall]\ncorners = [[0,0,40],[0,0,-40],[0,4,-40],[0,4,40]]\n{rock}{more}\n\
-         [lights.sun]\ndirection = [-1, 1, 0]\n"
+         [lights.sun]\ndirection = [-1, 1, 0]\n{rest}"
     ))
 }
 

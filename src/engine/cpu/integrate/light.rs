@@ -54,8 +54,10 @@ impl Integrator<'_> {
     #[inline]
     pub(super) fn ray_lights(&self, ray: &SheetHit, level: &Level) -> impl Iterator<Item = RayLight> {
         let texture_frame = self.scene.angles == AngleFrame::Texture;
+        let left = self.light_left(ray.quad, ray.uv);
         let terms = move |(i, light): (usize, &crate::light::Light)| {
             let (to_light, intensity) = light.at(ray.point);
+            let intensity = intensity * left.of(i);
             let l = self.in_plane(ray, to_light);
             let l_cell = ray.frame.cell_from_plane(l);
             let l_v =

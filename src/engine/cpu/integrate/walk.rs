@@ -79,6 +79,8 @@ struct Walked<'a> {
     level: &'a Level<'a>,
     lights: Vec<RayLight>,
     scatter: Option<Vec<RayScatter>>,
+    /// Share of the surroundings' light that shade leaves.
+    sky_left: f32,
     result: LevelResult,
 }
 
@@ -88,7 +90,8 @@ impl Integrator<'_> {
         let lights: Vec<RayLight> = self.ray_lights(ray, level).collect();
         let lit = vec![Lit::default(); lights.len()];
         let result = LevelResult { transmittance: before, lit, tint: Vec3::ZERO, cells: [0; 2] };
-        Walked { ray, level, lights, scatter: self.ray_scatter(ray), result }
+        let sky_left = self.light_left(ray.quad, ray.uv).sky;
+        Walked { ray, level, lights, scatter: self.ray_scatter(ray), sky_left, result }
     }
 
     /// Walks one level of the volume to the end of the slab or of the ray. T before the sheet is `before`.
@@ -213,7 +216,7 @@ impl Integrator<'_> {
     /// Adds the light of a cell that a ray sees.
     #[inline(always)]
     fn light_cell<O: Observer>(&self, walked: &mut Walked, seen: Seen, observer: &mut O) {
-        let Walked { ray, level, lights, scatter, result } = walked;
+        let Walked { ray, level, lights, scatter, sky_left, result } = walked;
         let Seen { at, cell, k: [k_d, k_s], moments, weight, tau_bits, depth } = seen;
         let scene = self.scene;
         let matter = ray.matter(level);
@@ -221,7 +224,8 @@ impl Integrator<'_> {
         let k = [k_d, ink.map_or(k_s, |ink| ink.k_s)];
         let more = ink.map_or(Vec3::ZERO, |ink| (ink.color - Vec3::ONE) * weight);
         result.tint += more;
-        observer.ambient(self.ambient_of(ray.volume, matter.mist > 0.0) * (Vec3::splat(weight) + more));
+        let ambient = self.ambient_of(ray.volume, matter.mist > 0.0) * *sky_left;
+        observer.ambient(ambient * (Vec3::splat(weight) + more));
 
         let v = cell.v_code();
         let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);

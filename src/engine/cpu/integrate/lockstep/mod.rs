@@ -35,7 +35,7 @@ mod tear;
 mod walk;
 
 use fearless_simd::{Simd, dispatch};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
@@ -43,7 +43,7 @@ use self::hits::Hits;
 use self::shell::{Ground, ShellHit, ShellLanes};
 pub use self::shell_fill::Fill;
 use super::walk::Lit;
-use super::{Carrier, Integrator, PixelRay, RayResult, SheetOrder};
+use super::{Carrier, Integrator, PixelRay, RayResult, SheetOrder, SheetPlace};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
 use crate::trace::lookup::{Level, STRANDS, StrandTurn};
@@ -308,11 +308,13 @@ impl<'a> Lockstep<'a> {
                 own.iter_mut().zip(&*next).for_each(|(lit, next)| *lit = lit.mixed(next, share));
                 tint = tint * (1.0 - share) + other_tint * share;
             }
-            let point = values.point.get(i % LANES);
-            let quad = met.packs[i / LANES].quads[i % LANES];
-            let volume = integrator.scene.quads[quad].material.volume as usize;
-            let met = (point, volume, values.mist.0[i % LANES] > 0.0);
-            let passed = integrator.composed(met, transmittance, cells, (own, tint), sheet.order);
+            let [u, v, _] = values.at.get(i % LANES).to_array();
+            let place = SheetPlace {
+                quad: met.packs[i / LANES].quads[i % LANES],
+                uv: Vec2::new(u, v),
+                point: values.point.get(i % LANES),
+            };
+            let passed = integrator.composed(&place, transmittance, cells, (own, tint), sheet.order);
             integrator.add(&mut rays[sheet.ray].1, passed);
         }
     }
