@@ -61,6 +61,8 @@ pub struct Ends {
     pub fade: f32,
     /// Share of the profile over which the head grows from nothing.
     pub head: f32,
+    /// Whether what is left is squared, so that it ends without a kink: billows would show one as a border.
+    pub is_soft: bool,
 }
 
 impl Ends {
@@ -73,7 +75,8 @@ impl Ends {
         };
         let sides = ramp(2.0 * u.min(1.0 - u).max(0.0), self.edge);
         let broken = 1.0 - self.breakup * way * way;
-        1.0 - sides * broken * ramp(1.0 - way, self.fade) * ramp(way, self.head)
+        let left = sides * broken * ramp(1.0 - way, self.fade) * ramp(way, self.head);
+        1.0 - if self.is_soft { left * left } else { left }
     }
 
     /// Values of u at which e has a kink.

@@ -25,7 +25,7 @@ const FLIGHT_SHARE: [f32; 2] = [0.35, 0.65];
 const LAUNCH_WIDTH: f32 = 0.35;
 /// Erosion of an arc, which comes out of the foot of the fall and thins out to single drops. With less `fade`
 /// the arcs end in a row; with more of it nothing is left at the top.
-const ENDS: Ends = Ends { edge: 1.0, breakup: 0.3, fade: 0.7, head: 0.08 };
+const ENDS: Ends = Ends { edge: 1.0, breakup: 0.3, fade: 0.7, head: 0.08, is_soft: false };
 /// Steepest launch, degrees. A vertical parabola has no plane.
 const STEEPEST: f32 = 87.0;
 

@@ -63,16 +63,18 @@ impl Veil {
             |worn: f32, torn: f32| if is_water { WATER_COVER * (1.0 - worn) * (1.0 - torn) } else { 0.0 };
         let [a, b, c, d] = quad.worn;
         let cover = [cover(a, torn[0]), cover(b, torn[0]), cover(c, torn[1]), cover(d, torn[1])];
+        let map = &quad.map;
+        // The map of a triangle is affine; texture coordinates may mirror it.
         let uv = |p: Vec3| {
-            let away = p - quad.map.a_world;
-            quad.map.uv_and_det(Vec2::new(away.dot(quad.map.e1_world), away.dot(quad.map.e2_world))).0
+            let away = p - map.a_world;
+            let away = Vec2::new(away.dot(map.e1_world), away.dot(map.e2_world));
+            Vec2::new(away.perp_dot(map.f), map.e.perp_dot(away)) / map.e.perp_dot(map.f)
         };
         let uv = match quad.is_triangle() {
             true => quad.corners.map(uv),
             false => [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
         };
-        let is_triangle = quad.is_triangle();
-        Veil { corners: quad.corners, uv, normal: quad.map.n_world, is_triangle, cover }
+        Veil { corners: quad.corners, uv, normal: map.n_world, cover }
     }
 
     /// Side of a square as large as the quad, metres.
@@ -83,7 +85,7 @@ impl Veil {
 
     /// Values at the corners of the map, given those at the corners of what is drawn.
     fn on_map(&self, [a, b, c, d]: [f32; 4]) -> [f32; 4] {
-        if !self.is_triangle {
+        if !self.is_triangle() {
             return [a, b, c, d];
         }
         let [at_a, at_b, at_c, _] = self.uv;

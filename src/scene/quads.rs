@@ -308,6 +308,7 @@ fn sheet(v: &Values, origin: DVec3, materials: &Materials, name: &str) -> Result
             breakup: float("breakup"),
             fade: float("fade"),
             head: float("head"),
+            is_soft: faces,
         },
         surges: Surges::new(
             float("surge"),

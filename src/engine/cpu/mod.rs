@@ -138,6 +138,11 @@ fn render_volumes(
             .try_for_each_init(
                 || (Canvas::empty(scene), integrator.walker()),
                 |(canvas, walker), (i, ((radiance, counts), uncovered))| {
+                    // Zeroed memory that is read before it is written has two faults a page, and the second
+                    // interrupts all threads.
+                    radiance.fill([0.0; 4]);
+                    counts.fill([0; 2]);
+                    uncovered.fill(0.0);
                     for (k, &sample) in numbers.iter().enumerate() {
                         let clock = Instant::now();
                         let place = kept[k].as_ref().map(|bands| &bands[i]);

@@ -211,8 +211,9 @@ impl Plane {
                 high[axis] = high[axis].max(c);
             }
         }
-        let cell = ((high[0] - low[0]).max(high[1] - low[1]) / side as f32).max(1e-6);
-        cell.is_finite().then_some(Plane { x, y, to_light, origin: low, cell, side })
+        let extent = (high[0] - low[0]).max(high[1] - low[1]);
+        let cell = (extent / side as f32).max(1e-6);
+        (extent >= 0.0).then_some(Plane { x, y, to_light, origin: low, cell, side })
     }
 
     /// Projects a point: cells across the direction in x and y, metres along it in z.

@@ -21,10 +21,15 @@ pub struct Veil {
     pub uv: [Vec2; 4],
     /// Unit normal.
     pub normal: Vec3,
-    /// Whether it is a triangle.
-    pub is_triangle: bool,
     /// Share of the light that it hides at each corner, 0 to 1.
     pub cover: [f32; 4],
+}
+
+impl Veil {
+    /// Whether it is a triangle.
+    pub fn is_triangle(&self) -> bool {
+        self.corners[2] == self.corners[3]
+    }
 }
 
 /// Sheets as a light sees them.
@@ -55,7 +60,7 @@ impl Veils {
                 });
             };
             draw([a, b, c], [cover_a, cover_b, cover_c]);
-            if !veil.is_triangle {
+            if !veil.is_triangle() {
                 draw([a, c, d], [cover_a, cover_c, cover_d]);
             }
         }
