@@ -125,7 +125,6 @@ struct Recipe {
     streaks: f32,
     film: f32,
     bare: f32,
-    lichen: Vec3,
 }
 
 /// Weights of the octaves in the noises that place moss and lichen. Signs alternate, so that moss grows on
@@ -139,6 +138,12 @@ const TINTED: [f32; OCTAVES] = [1.0, 1.0, 1.0, 0.8, 0.5, 0.3, 0.2, 0.3, 0.3, 0.2
 ///
 /// It is a choice: the libraries of spectra that the kinds' albedos come from have no moss on rock.
 const MOSS_ALBEDO: Vec3 = Vec3::new(0.036, 0.048, 0.016);
+/// Albedo of grey and grey-green lichen: the median of four spectra, two of *Lecidea* in place on its rocks
+/// and two of *Xanthoparmelia* (Kokaly and others 2017, USGS Spectral Library 7).
+///
+/// Each component of the four lies within 0.04 and 0.24. Yellow *Acarospora* and orange *Xanthoria* are left
+/// out: a median with them is a colour that none of them has.
+const LICHEN_ALBEDO: Vec3 = Vec3::new(0.201, 0.185, 0.107);
 
 impl StoneKind {
     /// Returns the mean albedo of the dry stone, linear RGB; `None` for plain rock.
@@ -166,7 +171,6 @@ impl StoneKind {
                 streaks: 0.16,
                 film: 0.05,
                 bare: 1.6,
-                lichen: Vec3::new(1.5, 1.56, 1.3),
             },
             StoneKind::Basalt => Recipe {
                 // Median of 20 solid samples (ECOSTRESS), of which 9 are called fresh and 1 weathered.
@@ -181,7 +185,6 @@ impl StoneKind {
                 streaks: 0.18,
                 film: 0.045,
                 bare: 2.1,
-                lichen: Vec3::new(2.4, 2.5, 2.0),
             },
             StoneKind::Limestone => Recipe {
                 // Median of 27 solid samples: 18 of ECOSTRESS and 9 of KLUM.
@@ -195,7 +198,6 @@ impl StoneKind {
                 streaks: 0.24,
                 film: 0.05,
                 bare: 1.5,
-                lichen: Vec3::new(0.5, 0.5, 0.52),
             },
             StoneKind::Slate => Recipe {
                 // A choice: measured grey slates are three, two of them tiles of roofs. Their median, 0.100,
@@ -210,7 +212,6 @@ impl StoneKind {
                 streaks: 0.15,
                 film: 0.03,
                 bare: 2.3,
-                lichen: Vec3::new(2.1, 2.2, 1.6),
             },
         })
     }
@@ -258,7 +259,7 @@ impl Stone {
             slope2: sum(|octave| octave.slope),
             moss_color: MOSS_ALBEDO.to_array(),
             moss2: sum(|octave| octave.moss),
-            lichen: recipe.lichen.to_array(),
+            lichen: (LICHEN_ALBEDO / recipe.albedo).to_array(),
             lichen2: sum(|octave| octave.lichen),
             octaves,
         })

@@ -259,6 +259,9 @@ fn kinds_have_the_albedos_of_the_documented_table() {
     for kind in KINDS {
         let word = kind.word();
         assert_eq!(kind.albedo(), Some(documented_albedo(&format!("`{word}`"))), "{word}");
+        // Lichen is kept as a factor of the albedo, so that its tone follows the rock's.
+        let lichen = Vec3::from(stone(kind, "").lichen) * kind.albedo().expect("a kind");
+        assert!((lichen - documented_albedo("lichen")).abs().max_element() < 1e-6, "{word}: {lichen}");
         assert_eq!(Vec3::from(stone(kind, "").moss_color), documented_albedo("moss"));
     }
 }
