@@ -125,7 +125,6 @@ struct Recipe {
     streaks: f32,
     film: f32,
     bare: f32,
-    lichen: Vec3,
 }
 
 /// Weights of the octaves in the noises that place moss and lichen. Signs alternate, so that moss grows on
@@ -135,11 +134,23 @@ const MOSS: [f32; OCTAVES] = [0.0, 0.45, -0.45, 0.45, -0.4, 0.35, -0.25, 0.2, 0.
 const LICHEN: [f32; OCTAVES] = [0.0, 0.5, 0.0, 0.6, 0.5, 0.35, 0.2, 0.1, 0.0, 0.0];
 /// Shares of the octaves' tones that have the stone's tint.
 const TINTED: [f32; OCTAVES] = [1.0, 1.0, 1.0, 0.8, 0.5, 0.3, 0.2, 0.3, 0.3, 0.2];
-/// Albedo of a mat of moss.
+/// Albedo of a mat of moss that is moist, as near falling water.
+///
+/// It is a choice: the libraries of spectra that the kinds' albedos come from have no moss on rock.
 const MOSS_ALBEDO: Vec3 = Vec3::new(0.036, 0.048, 0.016);
+/// Albedo of grey and grey-green lichen: the median of four spectra, two of *Lecidea* in place on its rocks
+/// and two of *Xanthoparmelia* (Kokaly and others 2017, USGS Spectral Library 7).
+///
+/// Each component of the four lies within 0.04 and 0.24. Yellow *Acarospora* and orange *Xanthoria* are left
+/// out: a median with them is a colour that none of them has.
+const LICHEN_ALBEDO: Vec3 = Vec3::new(0.201, 0.185, 0.107);
 
 impl StoneKind {
     /// Returns the mean albedo of the dry stone, linear RGB; `None` for plain rock.
+    ///
+    /// Those of granite, basalt and limestone are medians of measured spectra of solid samples: the ECOSTRESS
+    /// library (Meerdink and others 2019; Baldridge and others 2009) and KLUM (Ilehag and others 2019), under
+    /// the illuminant D65, by the CIE's observer of 1931. docs/method.md has their spread.
     pub fn albedo(self) -> Option<Vec3> {
         self.recipe().map(|recipe| recipe.albedo)
     }
@@ -148,7 +159,9 @@ impl StoneKind {
         Some(match self {
             StoneKind::Plain => return None,
             StoneKind::Granite => Recipe {
-                albedo: Vec3::new(0.27, 0.245, 0.22),
+                // Median of 13 solid samples: 8 hand samples (ECOSTRESS), and 5 unpolished, weathered stones
+                // of buildings and pavements (KLUM).
+                albedo: Vec3::new(0.228, 0.202, 0.182),
                 tone: [0.08, 0.09, 0.08, 0.07, 0.08, 0.09, 0.12, 0.22, 0.3, 0.2],
                 slope: [0.06, 0.09, 0.11, 0.11, 0.11, 0.13, 0.15, 0.17, 0.16, 0.1],
                 crack: [0.75, 0.5, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -158,10 +171,11 @@ impl StoneKind {
                 streaks: 0.16,
                 film: 0.05,
                 bare: 1.6,
-                lichen: Vec3::new(1.5, 1.56, 1.3),
             },
             StoneKind::Basalt => Recipe {
-                albedo: Vec3::new(0.075, 0.07, 0.066),
+                // Median of 20 solid samples (ECOSTRESS), of which 9 are called fresh and 1 weathered.
+                // Weathered faces are about twice as pale.
+                albedo: Vec3::new(0.101, 0.097, 0.09),
                 tone: [0.1, 0.12, 0.12, 0.11, 0.11, 0.12, 0.12, 0.12, 0.1, 0.08],
                 slope: [0.08, 0.14, 0.18, 0.18, 0.16, 0.16, 0.17, 0.18, 0.16, 0.1],
                 crack: [0.6, 0.7, 0.65, 0.5, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -171,10 +185,10 @@ impl StoneKind {
                 streaks: 0.18,
                 film: 0.045,
                 bare: 2.1,
-                lichen: Vec3::new(2.4, 2.5, 2.0),
             },
             StoneKind::Limestone => Recipe {
-                albedo: Vec3::new(0.36, 0.33, 0.275),
+                // Median of 27 solid samples: 18 of ECOSTRESS and 9 of KLUM.
+                albedo: Vec3::new(0.347, 0.323, 0.283),
                 tone: [0.08, 0.09, 0.09, 0.08, 0.08, 0.08, 0.08, 0.08, 0.07, 0.05],
                 slope: [0.05, 0.1, 0.13, 0.14, 0.14, 0.14, 0.13, 0.12, 0.1, 0.06],
                 crack: [0.5, 0.55, 0.45, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -184,9 +198,10 @@ impl StoneKind {
                 streaks: 0.24,
                 film: 0.05,
                 bare: 1.5,
-                lichen: Vec3::new(0.5, 0.5, 0.52),
             },
             StoneKind::Slate => Recipe {
+                // A choice: measured grey slates are three, two of them tiles of roofs. Their median, 0.100,
+                // 0.096, 0.099, is as dark, but less blue.
                 albedo: Vec3::new(0.105, 0.11, 0.118),
                 tone: [0.08, 0.1, 0.12, 0.13, 0.13, 0.12, 0.1, 0.08, 0.06, 0.04],
                 slope: [0.06, 0.14, 0.2, 0.22, 0.21, 0.18, 0.15, 0.11, 0.08, 0.05],
@@ -197,7 +212,6 @@ impl StoneKind {
                 streaks: 0.15,
                 film: 0.03,
                 bare: 2.3,
-                lichen: Vec3::new(2.1, 2.2, 1.6),
             },
         })
     }
@@ -245,7 +259,7 @@ impl Stone {
             slope2: sum(|octave| octave.slope),
             moss_color: MOSS_ALBEDO.to_array(),
             moss2: sum(|octave| octave.moss),
-            lichen: recipe.lichen.to_array(),
+            lichen: (LICHEN_ALBEDO / recipe.albedo).to_array(),
             lichen2: sum(|octave| octave.lichen),
             octaves,
         })

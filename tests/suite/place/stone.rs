@@ -244,6 +244,28 @@ fn rocks_have_the_albedo_of_their_kind_unless_the_scene_gives_one() {
     assert_eq!(StoneKind::Plain.albedo(), None);
 }
 
+/// Albedo that a row of the table in docs/method.md says taki takes.
+fn documented_albedo(row: &str) -> Vec3 {
+    let page = include_str!("../../../docs/method.md");
+    let table = &page[page.find("| kind | taki takes |").expect("the table of albedos")..];
+    let line = table.lines().find(|line| line.starts_with(&format!("| {row} |"))).expect(row);
+    let cell = line.split('|').nth(2).expect("a second cell");
+    let numbers: Vec<f32> = cell.split(',').map(|n| n.trim().parse().expect(cell)).collect();
+    Vec3::from_slice(&numbers)
+}
+
+#[test]
+fn kinds_have_the_albedos_of_the_documented_table() {
+    for kind in KINDS {
+        let word = kind.word();
+        assert_eq!(kind.albedo(), Some(documented_albedo(&format!("`{word}`"))), "{word}");
+        // Lichen is kept as a factor of the albedo, so that its tone follows the rock's.
+        let lichen = Vec3::from(stone(kind, "").lichen) * kind.albedo().expect("a kind");
+        assert!((lichen - documented_albedo("lichen")).abs().max_element() < 1e-6, "{word}: {lichen}");
+        assert_eq!(Vec3::from(stone(kind, "").moss_color), documented_albedo("moss"));
+    }
+}
+
 #[test]
 fn plain_rock_has_no_stone() {
     let mesh = wall("grain = 2.0\nmoss = 1.0\n").mesh();
