@@ -281,6 +281,19 @@ const GROUND: &str = "[rocks.floor]\ncorners = [[-3,-0.5,3],[3,-0.5,3],[3,-0.5,-
     corners = [[-3,-0.4,3],[3,-0.4,3],[3,-0.4,1],[-3,-0.4,1]]\n";
 
 #[test]
+fn a_pool_under_a_mesh_without_rock_is_shaded() {
+    let ball = Obj::default().ball(DVec3::Y, 0.6, 40);
+    let pool = "[pools.p]\ncorners = [[-3,-0.4,3],[3,-0.4,3],[3,-0.4,-3],[-3,-0.4,-3]]\n";
+    let mesh = scene(&ball, pool, &[SUN]).mesh();
+    let pool: Vec<&Vertex> = mesh.vertices.iter().filter(|vertex| vertex.pool == 1).collect();
+    assert!(pool.iter().all(|vertex| (0.0..=1.0).contains(&vertex.occlusion)));
+    assert!(pool.iter().all(|vertex| (0.0..=1.0).contains(&vertex.shadow)));
+    assert!(
+        pool.iter().any(|vertex| vertex.occlusion > 0.2) && pool.iter().any(|vertex| vertex.shadow == 1.0)
+    );
+}
+
+#[test]
 fn rock_and_pools_are_shaded_by_meshes_where_both_want_it() {
     let ball = Obj::default().ball(DVec3::Y, 0.6, 40);
     let of = |sets: &[&str]| scene(&ball, GROUND, &[&[SUN][..], sets].concat()).mesh().vertices;
