@@ -14,6 +14,7 @@
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::Vertex;
 use crate::picture::{Camera, Image};
@@ -72,7 +73,7 @@ pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec
         for y in 0..across {
             for x in 0..across {
                 let own = number + y * across + x;
-                let mut tile = Tile {
+                let tile = Tile {
                     first: first + (y * pitch + x) * side,
                     pitch,
                     side,
@@ -92,12 +93,12 @@ pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec
                     out,
                     lost: [Vec2::ZERO; STEPS],
                 };
-                tile.measure(vertices);
                 tiles.push(tile);
             }
         }
         first += pitch * pitch;
     }
+    tiles.par_iter_mut().for_each(|tile| tile.measure(vertices));
     tiles
 }
 

@@ -43,14 +43,18 @@ impl<'a> Projection<'a> {
     /// Returns the triangles of each tile of the opaque mesh.
     pub fn rock(&self, mesh: &Mesh) -> Vec<Piece> {
         let steps = tiles::steps(&mesh.tiles, &self.scene.camera, &self.scene.image);
-        let piece = |(i, tile): (usize, &Tile)| {
+        // A piece grows in memory that the next one uses again, and is copied at its size. Memory of its own
+        // would move several times as it grows.
+        let piece = |room: &mut Piece, (i, tile): (usize, &Tile)| {
             if !self.may_show(tile.low, tile.high) {
                 return Piece::default();
             }
             let corners = tile.triangles(steps[i], tiles::coarser(&mesh.tiles, &steps, i));
-            self.tile(tile, corners, &mesh.vertices)
+            room.clear();
+            self.tile(tile, corners, &mesh.vertices, room);
+            room.clone()
         };
-        mesh.tiles.par_iter().enumerate().map(piece).collect()
+        mesh.tiles.par_iter().enumerate().map_init(Piece::default, piece).collect()
     }
 
     /// Returns the triangles of each volume quad.
@@ -91,21 +95,19 @@ impl<'a> Projection<'a> {
         pieces
     }
 
-    /// Triangles between corners of a tile, three at a time.
-    fn tile(&self, tile: &Tile, corners: &[u16], vertices: &[Vertex]) -> Piece {
-        let mut out = Piece::default();
+    /// Adds the triangles between corners of a tile, three at a time.
+    fn tile(&self, tile: &Tile, corners: &[u16], vertices: &[Vertex], out: &mut Piece) {
         // Six triangles meet in a vertex of a grid, which is projected once.
         let mut points = [None; POINTS];
         for &corners in corners.as_chunks::<3>().0 {
             let points = corners.map(|corner| {
                 *points[usize::from(corner)].get_or_insert_with(|| {
                     let vertex = &vertices[tile.vertex_of(corner) as usize];
-                    self.point(vertex.position.into(), tile.place_of(corner), &mut out)
+                    self.point(vertex.position.into(), tile.place_of(corner), out)
                 })
             });
-            self.triangle(points, &mut out);
+            self.triangle(points, out);
         }
-        out
     }
 
     /// Adds a point. Returns it in clip space, with its index.

@@ -49,6 +49,7 @@ impl ScreenPoint {
 }
 
 /// A triangle between points of its piece.
+#[derive(Clone, Copy)]
 struct ScreenTriangle {
     points: [u16; 3],
     /// First and last band that it reaches into.
@@ -57,7 +58,7 @@ struct ScreenTriangle {
 
 /// Triangles of one tile of rock, of one quad or of a part of a shell's hull, clipped at the near plane, in
 /// drawing order.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Piece {
     points: Vec<ScreenPoint>,
     triangles: Vec<ScreenTriangle>,
@@ -171,6 +172,13 @@ pub fn clip_near(corners: [(Vec4, Vec2); 3], near: f32, mut part: impl FnMut([(V
 }
 
 impl Piece {
+    /// Removes all points and triangles, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.triangles.clear();
+        self.faces.clear();
+    }
+
     /// Adds a point and returns its index.
     #[inline]
     pub fn add_point(&mut self, point: ScreenPoint) -> u16 {
