@@ -114,7 +114,6 @@ fn render_volumes(
         let clock = Instant::now();
         let rasters = &mut light_volumes.rasters;
         let mut kept_of = |&sample: &u32| rasters.get(scene, mesh, band, sample, options.keep_rasters);
-        let first_sum = numbers.iter().position(|sample| samples.contains(sample));
         let kept: Vec<Option<Arc<Bands>>> = numbers.iter().map(&mut kept_of).collect();
         let is_drawn = kept.iter().all(|bands| bands.as_ref().is_some_and(|bands| is_drawn(bands)));
         let drawing = (!is_drawn).then(|| Drawing::new(Level::new(), scene, mesh, band, &numbers));
@@ -167,15 +166,10 @@ fn render_volumes(
                             continue;
                         }
                         let of_band: Vec<[u32; 2]> = gbuffer.window.each().collect();
-                        // The first sample does not read the zeros: a page that is read before it is written
-                        // is mapped twice, and the second time stops the other threads.
-                        let is_first = first_sum == Some(k);
                         walker.pixels(gbuffer, &of_band, sample, |k, result| {
                             let new = result.radiance.extend(result.transmittance).to_array();
-                            let (sum, count) =
-                                if is_first { Default::default() } else { (radiance[k], counts[k]) };
-                            radiance[k] = [0, 1, 2, 3].map(|c| new[c] + sum[c]);
-                            counts[k] = [0, 1].map(|c| count[c] + result.cells[c]);
+                            radiance[k] = [0, 1, 2, 3].map(|c| new[c] + radiance[k][c]);
+                            counts[k] = [0, 1].map(|c| counts[k][c] + result.cells[c]);
                             if let Some(sum) = uncovered.get_mut(k) {
                                 *sum += result.uncovered;
                             }
