@@ -67,8 +67,8 @@ use crate::picture::{AutoExposure, Camera, Image, Lens, check_image};
 use crate::place::paint::coarsened;
 use crate::place::paint::texture::MOST_BYTES;
 use crate::place::{
-    DiffuseKey, DiffuseOfShells, Ground, Mesh, Pool, Rock, ShadeMemo, ShadedWater, ShellShadows, Triangles,
-    Veil, WaterFaces,
+    DiffuseKey, DiffuseOfShells, Ground, Mesh, MeshShade, Pool, Rock, ShadeMemo, ShadedWater, ShellShadows,
+    Triangles, Veil, WaterFaces,
 };
 use crate::trace::{Attenuation, Trace, pyramid_spec};
 use crate::util::cache::Cache;
@@ -542,14 +542,11 @@ impl Scene {
     pub fn ground(&self) -> Ground {
         let shades = || self.triangles.iter().map(|own| own.shade);
         let wet = self.rocks.iter().any(|rock| rock.wet > 0.0) || shades().any(|shade| shade.wet > 0.0);
-        let shaded =
-            self.rocks.iter().any(|rock| rock.shadow > 0.0) || shades().any(|shade| shade.shadow > 0.0);
-        let sun = self.shadow_light().filter(|_| shaded).map(|i| self.lights[i].at(Vec3::ZERO).0);
-        let is_hidden =
-            shades().any(|shade| shade.occlusion > 0.0) || self.rocks.iter().any(|rock| rock.occlusion > 0.0);
+        let [hides_sky, hides_sun] = self.hides_light();
+        let sun = self.shadow_light().filter(|_| hides_sun).map(|i| self.lights[i].at(Vec3::ZERO).0);
         let [occlusion, shadow] = self.water_shade;
-        let occlusion = if is_hidden { occlusion } else { 0.0 };
-        let shadow = if shaded { shadow } else { 0.0 };
+        let occlusion = if hides_sky { occlusion } else { 0.0 };
+        let shadow = if sun.is_some() { shadow } else { 0.0 };
         let veils = match occlusion > 0.0 || shadow > 0.0 {
             true => self.quads.iter().map(Veil::of).collect(),
             false => Vec::new(),
@@ -564,6 +561,15 @@ impl Scene {
             sun,
             origin: self.camera.origin,
         }
+    }
+
+    /// Whether any rock or mesh hides the surroundings' light, and the sun's.
+    fn hides_light(&self) -> [bool; 2] {
+        let any = |of_rock: fn(&Rock) -> f32, of_mesh: fn(&MeshShade) -> f32| {
+            self.rocks.iter().any(|rock| of_rock(rock) > 0.0)
+                || self.triangles.iter().any(|own| of_mesh(&own.shade) > 0.0)
+        };
+        [any(|rock| rock.occlusion, |mesh| mesh.occlusion), any(|rock| rock.shadow, |mesh| mesh.shadow)]
     }
 
     /// Returns the corners of the quads that are not mist, metres.
@@ -750,6 +756,15 @@ impl Scene {
         }
         warnings.extend(self.unmapped.iter().map(|(name, count)| {
             format!("mesh {name}: {count} faces carry no volume, as their texture coordinates span no area")
+        }));
+        let strengths = ["occlusion", "shadow"].into_iter().zip(self.hides_light());
+        warnings.extend(strengths.filter(|(_, hides)| !hides).filter_map(|(name, _)| {
+            let key = format!("light.{name}");
+            let is_asked = |values: &&Values| values.is_set_by_user(&key) && values.float(&key) > 0.0;
+            self.values
+                .as_ref()
+                .filter(is_asked)
+                .map(|_| format!("{key} has no effect: no rock and no mesh of the scene has {name} above 0"))
         }));
         let turned = |values| meshes::turned_over(&self.shells, &self.recipes, values);
         warnings.extend(self.values.iter().flat_map(turned));

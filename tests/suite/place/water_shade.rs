@@ -9,6 +9,7 @@ use taki::mapping::{Quad, Tear};
 use taki::place::{QuadShade, Veil, WATER_COVER};
 use taki::scene::Scene;
 use taki::trace::tear;
+use taki::util::monitor::Unwatched;
 
 /// The floor and the wall with upright quads of water 1 m before the wall. Each is a square of 0.2 m around a
 /// height, in metres.
@@ -62,6 +63,21 @@ fn strengths_weaken_the_shade_and_0_makes_none() {
         ["floor", "wall"].map(|rock| [format!("rocks.{rock}.occlusion=0"), format!("rocks.{rock}.shadow=0")]);
     let off: Vec<&str> = off.iter().flatten().map(String::as_str).collect();
     assert!(with(&off).is_empty());
+    let warnings = |scene: &Scene| {
+        let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
+        scene
+            .warnings(&volumes)
+            .into_iter()
+            .filter(|warning| warning.contains("has no effect"))
+            .collect::<Vec<_>>()
+    };
+    assert!(warnings(&scene).is_empty());
+    assert_eq!(
+        warnings(&scene.with(&off).expect("a valid scene")),
+        ["occlusion", "shadow"].map(|name| format!(
+            "light.{name} has no effect: no rock and no mesh of the scene has {name} above 0"
+        ))
+    );
 }
 
 #[test]
