@@ -169,38 +169,39 @@ pub struct Ground {
 impl Ground {
     /// Builds the mesh. `memo` holds parts of what was built last.
     pub fn mesh(&self, memo: &ShadeMemo) -> Mesh {
-        let mesh = self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None);
-        self.with_water(self.with_fields(mesh, None), memo, None)
+        let mut mesh = self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None);
+        let field = |pool: &Pool| PoolField::new(pool, &mesh, &self.water, self.origin);
+        mesh.fields = Arc::new(self.pools.iter().map(field).collect());
+        self.with_water(mesh, memo, None)
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
     pub fn cached_mesh(&self, memo: &ShadeMemo, cache: &Cache) -> Mesh {
         let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
         let make = || Ok::<_, Infallible>(self.vertices(memo));
-        let key = key("mesh", BUILDER_VERSION, &self.of_grids());
-        let Ok(vertices) = cache.get("meshes", &key, count, make);
-        let mesh = self.with_meshes(self.grid_mesh(vertices), memo, Some(cache));
-        self.with_water(self.with_fields(mesh, Some(cache)), memo, Some(cache))
+        let grids = || {
+            let key = key("mesh", BUILDER_VERSION, &self.of_grids());
+            let Ok(vertices) = cache.get("meshes", &key, count, make);
+            self.with_meshes(self.grid_mesh(vertices), memo, Some(cache))
+        };
+        let field_key = |pool: &Pool| {
+            key("pool", FIELD_VERSION, &(&self.rocks, &self.triangles, pool, &self.water, self.origin))
+        };
+        let stored = |pool: &Pool| PoolField::stored(pool, cache, &field_key(pool));
+        // A field needs the mesh only where it has to be made.
+        let (mut mesh, stored) =
+            rayon::join(grids, || self.pools.iter().map(stored).collect::<Vec<Option<PoolField>>>());
+        let field = |(pool, stored): (&Pool, Option<PoolField>)| {
+            let made = || PoolField::cached(pool, &mesh, &self.water, self.origin, (cache, &field_key(pool)));
+            stored.or_else(made)
+        };
+        mesh.fields = Arc::new(self.pools.iter().zip(stored).map(field).collect());
+        self.with_water(mesh, memo, Some(cache))
     }
 
     /// Makes the mesh of rocks and pools of their vertices.
     fn grid_mesh(&self, vertices: Vec<Vertex>) -> Mesh {
         Mesh::new(vertices, self.grids()).with_stones(self.rocks.iter().zip(self.ranges()), self.origin)
-    }
-
-    /// Adds the fields of pools to the mesh, from `cache` where they are stored there.
-    fn with_fields(&self, mut mesh: Mesh, cache: Option<&Cache>) -> Mesh {
-        let field = |pool: &Pool| match cache {
-            Some(cache) => {
-                let parts = (&self.rocks, &self.triangles, pool, &self.water, self.origin);
-                let key = key("pool", FIELD_VERSION, &parts);
-                PoolField::cached(pool, &mesh, &self.water, self.origin, (cache, &key))
-            }
-            None => PoolField::new(pool, &mesh, &self.water, self.origin),
-        };
-        let fields: Vec<Option<PoolField>> = self.pools.iter().map(field).collect();
-        mesh.fields = Arc::new(fields);
-        mesh
     }
 
     /// Adds the shade on falling water to the mesh, from `cache` where it is stored there.

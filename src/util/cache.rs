@@ -23,6 +23,9 @@ const READ_SECONDS_PER_BYTE: f64 = 2e-9;
 /// Age from which a temporary file counts as left behind by a process that died.
 const STALE: Duration = Duration::from_secs(3600);
 
+/// Bytes that are read at a time.
+const PART: usize = 1 << 18;
+
 const MAGIC: [u8; 16] = *b"taki cache 1\n\r\n\0";
 /// Extension of cache files.
 const EXTENSION: &str = "made";
@@ -89,14 +92,18 @@ impl Cache {
         count: usize,
         make: impl FnOnce() -> Result<Vec<T>, E>,
     ) -> Result<Vec<T>, E> {
-        let path = self.path(kind, key);
-        if let Some(contents) = read(&path, key, count) {
+        if let Some(contents) = self.stored(kind, key, count) {
             return Ok(contents);
         }
         let clock = Instant::now();
         let made = make()?;
         self.keep_if_slow(kind, key, &made, clock.elapsed());
         Ok(made)
+    }
+
+    /// Returns the `count` values of `kind` and `key` if they are on the disk.
+    pub fn stored<T: Pod>(&self, kind: &str, key: &str, count: usize) -> Option<Vec<T>> {
+        read(&self.path(kind, key), key, count)
     }
 
     /// Keeps `made`, which took the time `took` to compute, if reading it takes less.
@@ -135,11 +142,16 @@ impl Head {
         let mut sum = Xxh3::new();
         sum.update(key.as_bytes());
         sum.update(contents);
+        Head::of_sum(key, contents.len(), &sum)
+    }
+
+    /// Header of a key and of `contents` bytes, of which `sum` is the checksum.
+    fn of_sum(key: &str, contents: usize, sum: &Xxh3) -> Head {
         let sum = sum.digest128();
         Head {
             magic: MAGIC,
             key: key.len() as u64,
-            contents: contents.len() as u64,
+            contents: contents as u64,
             checksum: [sum as u64, (sum >> 64) as u64],
         }
     }
@@ -160,9 +172,15 @@ fn read<T: Pod>(path: &Path, key: &str, count: usize) -> Option<Vec<T>> {
     if own_key != key.as_bytes() {
         return None;
     }
-    let mut contents = vec![T::zeroed(); count];
-    file.read_exact(bytemuck::cast_slice_mut(&mut contents)).ok()?;
-    if *head != *bytemuck::bytes_of(&Head::new(key, bytemuck::cast_slice(&contents))) {
+    let mut contents: Vec<T> = bytemuck::allocation::zeroed_vec(count);
+    let mut sum = Xxh3::new();
+    sum.update(key.as_bytes());
+    // Each part is summed while it is in the processor's cache.
+    for part in bytemuck::cast_slice_mut(&mut contents).chunks_mut(PART) {
+        file.read_exact(part).ok()?;
+        sum.update(part);
+    }
+    if *head != *bytemuck::bytes_of(&Head::of_sum(key, size_of_val(contents.as_slice()), &sum)) {
         return None;
     }
     // The time of last use decides which file is removed first.

@@ -288,7 +288,7 @@ pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
             1 => halved(fine, coarse, depth, |i| Mean::of(volume.cells[i])),
             _ => halved(fine, coarse, depth, |i| means[i]),
         };
-        let cells: Vec<Cell> = means.iter().map(Mean::packed).collect();
+        let cells: Vec<Cell> = means.par_iter().map(Mean::packed).collect();
         levels.push(VolumeTexture { size: coarse, alpha: volume.alpha, cells: cells.into() });
     }
     levels
@@ -351,14 +351,12 @@ fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, cell_at: impl Fn(usize) 
     let along = [0, 1, 2]
         .map(|axis| (0..coarse[axis]).map(|i| parts(fine[axis], coarse[axis], i)).collect::<Vec<_>>());
     let [nx, ny, nz] = coarse.map(|n| n as usize);
-    let mut means = vec![Mean::default(); nx * ny * nz];
-    means.par_chunks_mut(nx).enumerate().for_each(|(row, means)| {
+    let mean = |i: usize| {
+        let (row, x) = (i / nx, i % nx);
         let (y, z) = (along[1][row % ny], along[2][row / ny]);
-        for (mean, &x) in means.iter_mut().zip(&along[0]) {
-            *mean = mean_of_parts(fine, [x, y, z], depth, &cell_at);
-        }
-    });
-    means
+        mean_of_parts(fine, [along[0][x], y, z], depth, &cell_at)
+    };
+    (0..nx * ny * nz).into_par_iter().map(mean).collect()
 }
 
 /// Computes one coarse cell from the finer cells that it stands for, given along x, y and z as [`parts`]

@@ -189,20 +189,14 @@ impl<'a> Drawing<'a> {
         let grid = Grid::new(window, band_rows(window), &in_pixel);
         let depth = scene.depth_range(mesh);
         let projection = Projection::new(scene, &depth, &grid);
-        let rock = Rasteriser::new(projection.rock(mesh), &grid);
-        let mut water = projection.water();
-        water.extend(projection.hulls());
-        let water = Rasteriser::new(water, &grid);
-        Drawing {
-            simd,
-            grid,
-            offsets,
-            in_pixel,
-            times,
-            rock,
-            water,
-            shading: Shading::new(scene, mesh, &depth),
-        }
+        let faces = || {
+            let mut water = projection.water();
+            water.extend(projection.hulls());
+            (Rasteriser::new(water, &grid), Shading::new(scene, mesh, &depth))
+        };
+        // Each has parts that run on one thread.
+        let (rock, (water, shading)) = rayon::join(|| Rasteriser::new(projection.rock(mesh), &grid), faces);
+        Drawing { simd, grid, offsets, in_pixel, times, rock, water, shading }
     }
 
     /// Returns the targets of band number `i` for one of the samples. Triangles are drawn for several

@@ -130,11 +130,14 @@ fn render_volumes(
         // Rows are integrated as soon as they are drawn, while their targets are in the caches.
         let clock = Instant::now();
         let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
+        // Threads take one band after the other. Rayon's own parts of a list hold up to a quarter of the
+        // bands, and nobody helps with a part that is begun.
         frame.radiance[pixels.clone()]
-            .par_chunks_mut(part)
-            .zip(frame.counts[pixels.clone()].par_chunks_mut(part))
+            .chunks_mut(part)
+            .zip(frame.counts[pixels.clone()].chunks_mut(part))
             .zip(uncovered)
             .enumerate()
+            .par_bridge()
             .try_for_each_init(
                 || (Canvas::empty(scene), integrator.walker()),
                 |(canvas, walker), (i, ((radiance, counts), uncovered))| {

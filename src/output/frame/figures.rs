@@ -41,14 +41,16 @@ impl Figures {
         let chunks = frame.radiance.par_chunks(CHUNK).zip(frame.counts.par_chunks(CHUNK));
         let sums = chunks.map(|(radiance, counts)| {
             let mut sum = Figures { pixels: radiance.len() as u64, ..Default::default() };
+            let mut light = [0i64; 4];
             for (value, count) in radiance.iter().zip(counts) {
                 sum.covered_pixels += u64::from(count[0] > 0);
                 sum.cells_walked += u64::from(count[0]);
                 sum.light_cells_walked += u64::from(count[1]);
                 sum.non_finite_pixels += u64::from(!value.iter().all(|x| x.is_finite()));
-                (0..3).for_each(|c| sum.radiance_sum[c] += fixed(value[c]));
-                sum.transmittance_sum += fixed(value[3]);
+                (0..4).for_each(|c| light[c] += fixed(value[c]));
             }
+            let [r, g, b, transmittance] = light.map(i128::from);
+            (sum.radiance_sum, sum.transmittance_sum) = ([r, g, b], transmittance);
             sum
         });
         sums.reduce(Figures::default, |mut a, b| {
@@ -143,10 +145,12 @@ fn mean(sum: i128, pixels: u64) -> f64 {
     sum as f64 / UNIT / pixels.max(1) as f64
 }
 
-/// Converts a value to whole units of 1 / [`UNIT`].
-fn fixed(value: f32) -> i128 {
-    // NaN becomes 0 in the conversion to i64.
-    (f64::from(value.clamp(-BRIGHTEST, BRIGHTEST)) * UNIT).round() as i64 as i128
+/// Converts a value to whole units of 1 / [`UNIT`], less than 2³⁷ of them. Halves are rounded away from 0.
+fn fixed(value: f32) -> i64 {
+    // NaN becomes 0 in the conversion to i64. `f64::round` would be a call.
+    let units = f64::from(value.clamp(-BRIGHTEST, BRIGHTEST)) * UNIT;
+    let whole = units as i64;
+    whole + ((units - whole as f64) * 2.0) as i64
 }
 
 /// Returns the figures of a developed picture from its text, or of an EXR from its layers. Reads and checks
@@ -180,12 +184,12 @@ fn figures_of_exr(mut lines: ExrLines) -> Result<KnownFigures> {
             if let Some(colours) = &rgb {
                 for (sum, value) in radiance_sum.iter_mut().zip(lines.rec709(&line, colours, x)) {
                     finite &= value.is_finite();
-                    *sum += fixed(value);
+                    *sum += i128::from(fixed(value));
                 }
             }
             if let Some(t) = transmittance {
                 finite &= value(t, x).is_finite();
-                transmittance_sum += fixed(value(t, x));
+                transmittance_sum += i128::from(fixed(value(t, x)));
             }
             if let Some(n) = cells {
                 covered += u64::from(value(n, x) > 0.0);

@@ -27,6 +27,8 @@ pub const HARMONICS: [u32; MODES] = [4, 5, 7, 9];
 pub const LENGTHS: [f32; MODES] = [1.0, 0.8, 4.0 / 7.0, 4.0 / 9.0];
 /// Version of the fields' builder, a part of their key in the cache. Raise it with every change to them.
 pub const FIELD_VERSION: u32 = 2;
+/// Folder of the fields in the cache.
+const KIND: &str = "pools";
 
 /// A grid of square cells over the pool, with sides along x and z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -288,9 +290,6 @@ impl PoolField {
         if pool.waves == PoolWaves::Sum {
             return None;
         }
-        let grid = Grid::of(pool);
-        let coarse = grid.halved();
-        let (waves, foam) = (grid.cells() * 2 * MODES, coarse.cells() * 4);
         let make = || {
             let made = PoolField::of(pool, &Basin::new(pool, mesh, water), origin);
             let [mut all, carried] =
@@ -299,15 +298,36 @@ impl PoolField {
             all.extend(carried);
             Ok::<_, Infallible>(all)
         };
-        let Ok(mut all) = cache.get("pools", key, waves + foam, make);
-        let carried = all.split_off(waves);
-        Some(PoolField {
+        let Ok(all) = cache.get(KIND, key, PoolField::numbers(pool), make);
+        Some(PoolField::of_numbers(pool, &all))
+    }
+
+    /// Returns what [`PoolField::cached`] returns, if it is stored in the cache. The mesh is not needed then.
+    pub fn stored(pool: &Pool, cache: &Cache, key: &str) -> Option<PoolField> {
+        if pool.waves == PoolWaves::Sum {
+            return None;
+        }
+        let all = cache.stored(KIND, key, PoolField::numbers(pool))?;
+        Some(PoolField::of_numbers(pool, &all))
+    }
+
+    /// How many numbers of a pool's field are stored.
+    fn numbers(pool: &Pool) -> usize {
+        let grid = Grid::of(pool);
+        grid.cells() * 2 * MODES + grid.halved().cells() * 4
+    }
+
+    /// Returns the field of the numbers that are stored: the amplitudes, then what is carried.
+    fn of_numbers(pool: &Pool, all: &[f32]) -> PoolField {
+        let grid = Grid::of(pool);
+        let (waves, carried) = all.split_at(grid.cells() * 2 * MODES);
+        PoolField {
             grid,
             longest: longest(pool, &grid),
-            amplitudes: bytemuck::allocation::pod_collect_to_vec(&all),
-            coarse,
-            carried: bytemuck::allocation::pod_collect_to_vec(&carried),
-        })
+            amplitudes: bytemuck::cast_slice(waves).to_vec(),
+            coarse: grid.halved(),
+            carried: bytemuck::cast_slice(carried).to_vec(),
+        }
     }
 
     /// Computes the field of a pool in a basin.

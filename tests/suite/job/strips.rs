@@ -295,6 +295,20 @@ fn figures_of_parts_add_up_to_those_of_the_whole() {
     assert_eq!(Figures::of(&odd).non_finite_pixels, 1);
 }
 
+#[test]
+fn halves_of_a_unit_round_away_from_zero() {
+    // Numbers of half units about 0, and up to beyond the largest value that is added.
+    let halves = (-9i64..=9).chain([(1 << 24) - 1, 1 - (1 << 24), 1 << 37, 1 << 39, -(1 << 39)]);
+    for half in halves {
+        let value = half as f32 / 131_072.0;
+        let mut frame = Frame::new(1, 1, false);
+        frame.radiance[0] = [value; 4];
+        let figures = Figures::of(&frame);
+        let expected = (f64::from(value).clamp(-1_048_576.0, 1_048_576.0) * 65_536.0).round() as i128;
+        assert_eq!((figures.radiance_sum, figures.transmittance_sum), ([expected; 3], expected), "{half}");
+    }
+}
+
 /// Crops of the small subject in a folder, and the file of the whole picture.
 fn pieces(extension: &str, windows: &[(u32, u32, u32, u32)]) -> (TempDir, Vec<PathBuf>, PathBuf) {
     let (subject, dir) = (Subject::small(), tempdir().expect("a folder"));

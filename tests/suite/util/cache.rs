@@ -78,6 +78,24 @@ fn a_file_with_any_byte_changed_cut_off_or_added_is_as_if_it_were_not_there() {
 }
 
 #[test]
+fn a_large_file_is_checked_to_its_end() {
+    let dir = tempdir().unwrap();
+    let cache = Cache::new(dir.path(), 1 << 30);
+    let large: Vec<u32> = (0..300_001u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
+    cache.keep_if_slow("things", "a", &large, SLOW);
+    assert_eq!(cache.stored("things", "a", large.len()), Some(large.clone()));
+    assert_eq!(cache.stored::<u32>("things", "b", large.len()), None, "another key");
+    let path = cache.path("things", "a");
+    let whole = fs::read(&path).unwrap();
+    for at in [whole.len() - 1_200_004, whole.len() / 2, whole.len() - 1] {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 1;
+        fs::write(&path, damaged).unwrap();
+        assert_eq!(cache.stored::<u32>("things", "a", large.len()), None, "byte {at}");
+    }
+}
+
+#[test]
 fn what_was_used_longest_ago_makes_room() {
     let dir = tempdir().unwrap();
     let one = {

@@ -15,6 +15,10 @@ use crate::scene::Scene;
 const POINTS: usize = 3 * tiles::TRIANGLES as usize;
 const _: () = assert!((tiles::SIDE + 1) * (tiles::SIDE + 1) <= POINTS as u32);
 
+/// Tiles that a thread projects at a time. Those out of view take next to no time, so equal shares are
+/// uneven.
+const TILES: usize = 32;
+
 /// Faces of a hull in one piece. The near plane cuts a triangle into two at most.
 const HULL_PART: usize = 256;
 
@@ -54,7 +58,7 @@ impl<'a> Projection<'a> {
             self.tile(tile, corners, &mesh.vertices, room);
             room.clone()
         };
-        mesh.tiles.par_iter().enumerate().map_init(Piece::default, piece).collect()
+        mesh.tiles.par_iter().enumerate().with_max_len(TILES).map_init(Piece::default, piece).collect()
     }
 
     /// Returns the triangles of each volume quad.
