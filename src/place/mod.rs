@@ -26,4 +26,4 @@ pub use shell_shadows::{CASTER_BYTES, ShellShadows};
 pub use show::Show;
 pub use triangles::{MAX_ADDED, MeshShade, SHADE_BYTES, SHADE_VERSION, ShadeMemo, WaterFaces};
 pub use vertex::Vertex;
-pub use water_shade::{QuadShade, ShadedWater};
+pub use water_shade::{QuadShade, ShadedWater, WATER_SHADE_VERSION};

@@ -8,6 +8,7 @@ use std::process::Output;
 use std::time::{Duration, SystemTime};
 
 use crate::cli::faults;
+use taki::place::Mesh;
 use taki::scene::{Limits, Scene};
 use taki::util::cache::Cache;
 use taki::util::monitor::Unwatched;
@@ -201,7 +202,8 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
     }
     let files = |kind| fs::read_dir(dir.path().join(kind)).unwrap().count();
     // α is not stored in the cells. The last six changes leave the volume as it is, the first nine the mesh.
-    assert_eq!((files("volumes"), files("meshes")), (8, 7));
+    // Beside each mesh lies the shade on its water.
+    assert_eq!((files("volumes"), files("meshes")), (8, 14));
 }
 
 /// Command that renders a scene with a mesh that is slow to make, with its caches in the folder `cache`.
@@ -263,10 +265,19 @@ fn the_versions_of_the_builders_stand_for_what_they_make() {
         ],
     );
     let volume = build_water(&water.recipes[0].water, &Unwatched).unwrap();
-    let place = scene("waterfall", &crate::engine::gpu::COARSE_PLACE);
-    let vertices = crc32fast::hash(bytemuck::cast_slice(&place.mesh().vertices));
-    let made = format!("{:08x} {vertices:08x}", volume.checksum());
-    let versions = [taki::volume::BUILDER_VERSION, taki::place::BUILDER_VERSION];
-    // Without a new version, a new checksum would leave users with their old volumes and meshes.
-    assert_eq!((versions, made.as_str()), ([1, 2], "b972003d 0c471220"));
+    let mesh = |sets: &[&str]| {
+        let place = scene("waterfall", &[&crate::engine::gpu::COARSE_PLACE, sets].concat());
+        place.mesh()
+    };
+    let vertices = |mesh: &Mesh| crc32fast::hash(bytemuck::cast_slice(&mesh.vertices));
+    // Without the shadow of the water, and with it.
+    let sun = "lights.sun.direction=[0.3,1,0.55]";
+    let plain = vertices(&mesh(&["light.occlusion=0", "light.shadow=0", sun]));
+    let shaded = mesh(&[]);
+    let on_water = crc32fast::hash(bytemuck::cast_slice(&shaded.on_water));
+    let made = format!("{:08x} {plain:08x} {:08x} {on_water:08x}", volume.checksum(), vertices(&shaded));
+    let versions =
+        [taki::volume::BUILDER_VERSION, taki::place::BUILDER_VERSION, taki::place::WATER_SHADE_VERSION];
+    // Without a new version, a new checksum would leave users with their old volumes, meshes and shades.
+    assert_eq!((versions, made.as_str()), ([1, 2, 1], "b972003d 0c471220 6367ebd5 58edb726"));
 }
