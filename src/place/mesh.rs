@@ -12,7 +12,7 @@ use super::bvh::Bvh;
 use super::paint::{Painting, Paints, texture};
 use super::pool::Pool;
 use super::pool::field::{FIELD_VERSION, PoolField};
-use super::rock::shade::{self, Sky, Sun};
+use super::rock::shade::{self, SkyShade, SunShade};
 use super::rock::stone::Stone;
 use super::rock::veil::Veils;
 use super::rock::{Rock, wet};
@@ -217,9 +217,10 @@ impl Ground {
             let blocks = [has(|shade| shade.occlusion), has(|shade| shade.shadow)];
             let casters = (blocks != [false; 2]).then(|| self.casters(memo, &mesh.vertices));
             let [of_sky, of_sun] = self.blockers(casters.as_deref(), blocks);
-            let sky = Sky::new(&rocks, &mesh.vertices, of_sky.as_ref());
-            let sun =
-                self.sun.and_then(|to_sun| Sun::new(&rocks, &mesh.vertices, to_sun, of_sun.as_ref(), None));
+            let sky = SkyShade::new(&rocks, &mesh.vertices, of_sky.as_ref());
+            let sun = self
+                .sun
+                .and_then(|to_sun| SunShade::new(&rocks, &mesh.vertices, to_sun, of_sun.as_ref(), None));
             Ok::<_, Infallible>(water.shades(sky.as_ref(), sun.as_ref()))
         };
         let Ok(shades) = match cache {
@@ -303,12 +304,12 @@ impl Ground {
         let [blocks_sky, blocks_sun] = self.meshes_that_shade();
         let casters = (blocks_sky || blocks_sun).then(|| self.casters(memo, vertices));
         let [of_sky, of_sun] = self.blockers(casters.as_deref(), [blocks_sky, blocks_sun]);
-        if let Some(sky) = Sky::new(&rocks, vertices, of_sky.as_ref()) {
+        if let Some(sky) = SkyShade::new(&rocks, vertices, of_sky.as_ref()) {
             sky.occlude(&shaded(|rock| rock.occlusion, |mesh| mesh.occlusion), vertices);
         }
         let veils = self.veils();
         if let Some(to_sun) = self.sun
-            && let Some(sun) = Sun::new(&rocks, vertices, to_sun, of_sun.as_ref(), veils.as_ref())
+            && let Some(sun) = SunShade::new(&rocks, vertices, to_sun, of_sun.as_ref(), veils.as_ref())
         {
             sun.shadow(&shaded(|rock| rock.shadow, |mesh| mesh.shadow), vertices);
         }

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::rock::shade::{Blocked, SUN_RAYS, Sky, Sun, beside};
+use super::rock::shade::{Blocked, SUN_RAYS, SkyShade, SunShade, beside};
 use super::rock::veil::{Veil, WATER_COVER};
 use crate::mapping::Quad;
 use crate::trace::tear;
@@ -111,8 +111,8 @@ impl ShadedWater {
     /// Shade of each quad. Corners that several quads share have the same in all of them.
     pub fn shades<F: Blocked, G: Blocked>(
         &self,
-        sky: Option<&Sky<F>>,
-        sun: Option<&Sun<G>>,
+        sky: Option<&SkyShade<F>>,
+        sun: Option<&SunShade<G>>,
     ) -> Vec<QuadShade> {
         let key = |p: Vec3| p.to_array().map(f32::to_bits);
         let mut corners: HashMap<[u32; 3], Corner> = HashMap::new();

@@ -49,22 +49,22 @@ pub trait Blocked: Fn(Vec3, Vec3) -> bool + Sync {}
 impl<F: Fn(Vec3, Vec3) -> bool + Sync> Blocked for F {}
 
 /// What hides the surroundings: rocks whose `occlusion` is above 0, and what `blocked` meets.
-pub struct Sky<'a, F> {
+pub struct SkyShade<'a, F> {
     maps: Vec<DepthMap>,
     blocked: Option<&'a F>,
 }
 
-impl<'a, F: Blocked> Sky<'a, F> {
+impl<'a, F: Blocked> SkyShade<'a, F> {
     /// Draws the rocks. None if nothing hides the surroundings.
     pub fn new(
         rocks: &[(&Rock, Range<usize>)],
         vertices: &[Vertex],
         blocked: Option<&'a F>,
-    ) -> Option<Sky<'a, F>> {
+    ) -> Option<SkyShade<'a, F>> {
         let casters = triangles(rocks, |rock| rock.occlusion, 4);
         let draw = |i| DepthMap::new(&casters, vertices, direction(i), SIDE);
         let maps: Vec<DepthMap> = (0..DIRECTIONS).into_par_iter().filter_map(draw).collect();
-        (!maps.is_empty() || blocked.is_some()).then_some(Sky { maps, blocked })
+        (!maps.is_empty() || blocked.is_some()).then_some(SkyShade { maps, blocked })
     }
 
     /// Sets the occlusion of vertices.
@@ -108,14 +108,14 @@ impl<'a, F: Blocked> Sky<'a, F> {
 pub const SUN_RAYS: u32 = 8;
 
 /// What hides a light at infinity: rocks whose `shadow` is above 0, what `blocked` meets, and falling water.
-pub struct Sun<'a, F> {
+pub struct SunShade<'a, F> {
     map: Option<DepthMap>,
     blocked: Option<&'a F>,
     veils: Option<&'a Veils>,
     to_light: Vec3,
 }
 
-impl<'a, F: Blocked> Sun<'a, F> {
+impl<'a, F: Blocked> SunShade<'a, F> {
     /// Draws the rocks. None if nothing hides the light.
     pub fn new(
         rocks: &[(&Rock, Range<usize>)],
@@ -123,9 +123,9 @@ impl<'a, F: Blocked> Sun<'a, F> {
         to_light: Vec3,
         blocked: Option<&'a F>,
         veils: Option<&'a Veils>,
-    ) -> Option<Sun<'a, F>> {
+    ) -> Option<SunShade<'a, F>> {
         let map = DepthMap::new(&triangles(rocks, |rock| rock.shadow, 1), vertices, to_light, SUN_SIDE);
-        let sun = Sun { map, blocked, veils, to_light };
+        let sun = SunShade { map, blocked, veils, to_light };
         (sun.map.is_some() || blocked.is_some() || veils.is_some()).then_some(sun)
     }
 
