@@ -64,11 +64,10 @@ impl Veil {
         let [a, b, c, d] = quad.worn;
         let cover = [cover(a, torn[0]), cover(b, torn[0]), cover(c, torn[1]), cover(d, torn[1])];
         let map = &quad.map;
-        // The map of a triangle is affine; texture coordinates may mirror it.
         let uv = |p: Vec3| {
             let away = p - map.a_world;
             let away = Vec2::new(away.dot(map.e1_world), away.dot(map.e2_world));
-            Vec2::new(away.perp_dot(map.f), map.e.perp_dot(away)) / map.e.perp_dot(map.f)
+            map.uv_and_det(away).0
         };
         let uv = match quad.is_triangle() {
             true => quad.corners.map(uv),

@@ -145,8 +145,8 @@ fn triangles_and_quads_that_share_a_corner_share_its_shade() {
             let map = &scene.quads[quad].map;
             let away = p - map.a_world;
             let away = Vec2::new(away.dot(map.e1_world), away.dot(map.e2_world));
-            let affine = Vec2::new(away.perp_dot(map.f), map.e.perp_dot(away)) / map.e.perp_dot(map.f);
-            shades[quad].left(if quad == 2 { map.uv(away) } else { affine })
+            // Not clamped: a point on an edge may lie outside by a rounding error.
+            shades[quad].left(map.uv_and_det(away).0)
         };
         let close = |a: [f32; 2], b: [f32; 2]| (0..2).all(|i| (a[i] - b[i]).abs() < 1e-4);
         for (first, second, p) in
