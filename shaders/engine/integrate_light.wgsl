@@ -68,7 +68,7 @@ struct SheetHit {
 
 // Shares of the light that shade leaves.
 struct LightLeft {
-    // That of the surroundings, and that of the light that casts shadows.
+    // Shares of the surroundings' light, and of the light that casts shadows.
     sky: f32,
     sun: f32,
     // Number of that light, and of the scene's own lights, which those of the surroundings follow.

@@ -234,7 +234,7 @@ impl Ground {
         mesh
     }
 
-    /// What meshes block of the surroundings' light and of the sun's, where `is_asked`.
+    /// Returns whether meshes block the surroundings' light, and the sun's, where `is_asked`.
     fn blockers<'a>(
         &self,
         casters: Option<&'a Bvh>,

@@ -35,9 +35,9 @@ pub struct ShadedWater {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct QuadShade {
-    /// That of the light of the surroundings.
+    /// Share of the light of the surroundings.
     pub occlusion: [f32; 4],
-    /// That of the light of [`Scene::shadow_light`](crate::scene::Scene::shadow_light).
+    /// Share of the light of [`Scene::shadow_light`](crate::scene::Scene::shadow_light).
     pub shadow: [f32; 4],
 }
 
@@ -55,7 +55,7 @@ impl QuadShade {
 }
 
 impl Veil {
-    /// What a quad hides of the light. Mist hides none.
+    /// Light that a quad hides. Mist hides none.
     pub fn of(quad: &Quad) -> Veil {
         let torn = quad.tear.open.map(tear::mean);
         let is_water = quad.mist == 0.0;

@@ -188,9 +188,9 @@ struct SheetPlace {
 
 /// Shares of the light that shade leaves.
 struct LightLeft {
-    /// That of the surroundings.
+    /// Share of the surroundings' light.
     sky: f32,
-    /// That of the light that casts shadows.
+    /// Share of the light that casts shadows.
     sun: f32,
     shadow_light: Option<usize>,
     /// Number of the scene's own lights, which those of the surroundings follow.

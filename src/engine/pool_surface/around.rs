@@ -101,7 +101,7 @@ fn add_water(scene: &Scene, mesh: &Mesh, middle: Vec3, cells: &mut [[f32; 4]]) {
     let sun = scene.shadow_light().map_or(Vec3::ZERO, |i| lights[i]);
     let white = lights.iter().fold(sky, |sum, light| sum + *light);
     let mut cover = vec![0.0f32; cells.len()];
-    // What shade takes from the light of the water in each cell.
+    // Light that shade takes from the water in each cell.
     let mut lost = vec![Vec3::ZERO; cells.len()];
     for (i, quad) in scene.quads.iter().enumerate().filter(|(_, quad)| quad.mist == 0.0) {
         let shade = mesh.on_water.get(i).copied().unwrap_or_default();

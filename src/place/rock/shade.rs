@@ -43,12 +43,12 @@ struct DepthMap {
 /// A range of vertices that are shaded, and the share of the light that they lose where no light arrives.
 pub type ShadedRange = (f32, Range<usize>);
 
-/// What blocks light besides rocks: whether it meets anything from a point along a direction.
+/// Test for what blocks light besides rocks: whether it meets anything from a point along a direction.
 pub trait Blocked: Fn(Vec3, Vec3) -> bool + Sync {}
 
 impl<F: Fn(Vec3, Vec3) -> bool + Sync> Blocked for F {}
 
-/// What hides the surroundings: rocks whose `occlusion` is above 0, and what `blocked` meets.
+/// Casters that hide the surroundings: rocks whose `occlusion` is above 0, and what `blocked` meets.
 pub struct SkyShade<'a, F> {
     maps: Vec<DepthMap>,
     blocked: Option<&'a F>,
@@ -107,7 +107,8 @@ impl<'a, F: Blocked> SkyShade<'a, F> {
 /// Points around a vertex from which rays go to the sun past what is no rock.
 pub const SUN_RAYS: u32 = 8;
 
-/// What hides a light at infinity: rocks whose `shadow` is above 0, what `blocked` meets, and falling water.
+/// Casters that hide a light at infinity: rocks whose `shadow` is above 0, what `blocked` meets, and
+/// falling water.
 pub struct SunShade<'a, F> {
     map: Option<DepthMap>,
     blocked: Option<&'a F>,

@@ -81,9 +81,10 @@ pub(super) const LIGHT: Group = Group {
             .when("Raise it when water in a gorge or a cave is as bright as under the open sky."),
         p("light.shadow", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(
-                "Share of the brightest directional light that water on quads loses in the shadow of rocks \
-                 and meshes with `shadow` above 0, and strength of the shadow that the water casts on them \
-                 and on pools. Volumes in boxes and on shells do without it.",
+                "Share of the brightest directional light that water on quads loses in the shadow of \
+                 rocks and meshes with `shadow` above 0, and strength of the shadow that the water \
+                 casts on them and on the pools beside them. Without such a rock or mesh it has no \
+                 effect. Volumes in boxes and on shells do without it.",
             )
             .when("Raise it to 1 when the sun shines through rock on water, or water casts no shadow."),
     ],

@@ -32,9 +32,9 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
             .when("Set it to 0.25 to 0.5 for mist; raise it when the mist looks too dark."),
         p("materials.*.facing", "", "", Switch(false), Uniform)
             .doc(
-                "Whether sheets of mist turn about the vertical to face the camera, and thin out softly \
-                 towards their borders. A cloud of drops looks alike from all sides; a sheet that stands \
-                 still would show its edge from aside.",
+                "Whether sheets of mist turn about the vertical to face the camera. What the sheet's `edge`, \
+                 `head` and `fade` leave is squared then, so that it ends softly. A cloud of drops looks \
+                 alike from all sides; a sheet that stands still would show its edge from aside.",
             )
             .when("Switch it on for spray that the camera may see from any side."),
         p("materials.*.billow", "", "", Float(0.0, 1.0, 0.0), Uniform)
